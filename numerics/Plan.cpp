@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+#include "numerics/Plan.h"
+#include "numerics/PlanCost.h"
+#include "numerics/Quadrature.h"
+#include "numerics/Window.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace PSE::numerics {
+
+namespace {
+
+constexpr double BUDGET_PER_HALF = 0.5;     ///< share of the tolerance that each half may use
+constexpr double LOCAL_VOLUME_FRACTION = 0.3; ///< clusters and chains are denser than the box mean
+constexpr double SMALLEST_XI = 1e-6, LARGEST_XI = 20; ///< splitting parameter times radius, what a Plan accepts
+constexpr double WIDEST_GRID = 32768;       ///< grid points along one axis; beyond, nothing can be allocated
+constexpr double LARGEST_LIST_RANGE = 0.499; ///< of the box: a neighbour list in single precision needs a margin below 1/2
+constexpr double TABLE_SHARE = 0.05;        ///< share of a half's budget for tables
+
+double volumeFraction(const PlanRequest& r) {
+    return r.numParticles*4.0/3*M_PI*r.radius*r.radius*r.radius/r.box.volume();
+}
+
+/** Support and grid spacing that keep the error of the wave half, [T15]: digits + 2 points, or one less on a finer grid. */
+struct WindowChoice {
+    int support;
+    double finer; ///< factor on the Nyquist wave number
+};
+
+int supportFor(double error) {
+    return std::clamp(static_cast<int>(std::lround(2 - std::log10(error))), 4, 14);
+}
+
+double shapeFor(double error, int support) {
+    return std::max(std::log(10/error), Window::minShape(support));
+}
+
+std::array<int, 3> gridFor(const Lattice& box, double nyquist, int support) {
+    std::array<int, 3> grid;
+    for (int d = 0; d < 3; d++) {
+        // The length of the box vector, not the width of the box, keeps every face of the Nyquist cell beyond `nyquist`.
+        const double points = std::max(box.length(d)*nyquist/M_PI, double(support));
+        grid[d] = (points > WIDEST_GRID ? static_cast<int>(std::min(points, 2e9)) : nextFftSize(int(std::ceil(points))));
+    }
+    return grid;
+}
+
+double orderedPairs(const PlanRequest& r, double rc, bool sumImages) {
+    const double inRange = r.numParticles/r.box.volume()*4.0/3*M_PI*rc*rc*rc;
+    // An explicit sum looks at every pair in every image cell that the range touches.
+    const double touched = r.numParticles*std::pow(1 + 2*rc/std::cbrt(r.box.volume()), 3);
+    return r.numParticles*(inRange + (sumImages ? 0.5*touched : 0));
+}
+
+/** The one-parameter family of Plans, by xi; reduced length units inside. */
+class Planner {
+public:
+    explicit Planner(const PlanRequest& request)
+        : request(request), box(scaledBox(request)), error(BUDGET_PER_HALF*request.tolerance),
+          phi(std::max(volumeFraction(request), LOCAL_VOLUME_FRACTION)) {
+    }
+
+    /** @param xi  in 1/a */
+    Plan at(double xi, double& cost) const {
+        const PlanOverrides& wish = request.overrides;
+        Plan plan;
+        plan.split = std::make_shared<HasimotoSplit>(xi);
+        plan.a = request.radius;
+        plan.xi = (wish.xi > 0 ? wish.xi : xi/plan.a);
+        plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff : plan.a*plan.split->realCutoff(error, phi));
+        plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE*request.box.smallestWidth();
+        plan.lanczosTolerance = (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5*request.tolerance);
+        plan.tableError = TABLE_SHARE*error;
+        plan.precision = (request.tolerance >= request.singleFloor ? Precision::Single : Precision::Double);
+        chooseWindow(plan, cost);
+        return plan;
+    }
+
+    /** Grow an automatic grid until the full estimate of the wave error keeps the budget; set the predicted error. */
+    void finish(Plan& plan) const {
+        const bool automatic = (request.overrides.grid[0] == 0);
+        const double budget = error;
+        double wave = waveErrorOf(plan);
+        for (int attempt = 0; automatic && wave > budget && attempt < 40; attempt++) {
+            for (int d = 0; d < 3; d++)
+                plan.grid[d] = nextFftSize(plan.grid[d] + 1);
+            wave = waveErrorOf(plan);
+        }
+        const double real = plan.split->realTruncation(plan.realCutoff/plan.a, phi);
+        plan.predictedError = std::hypot(wave, real);
+    }
+
+private:
+    static Lattice scaledBox(const PlanRequest& r) {
+        const Matrix3 v = r.box.vectors()/r.radius;
+        return Lattice(v.col(0), v.col(1), v.col(2));
+    }
+
+    double waveErrorOf(const Plan& plan) const {
+        return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
+    }
+
+    void chooseWindow(Plan& plan, double& cost) const {
+        const PlanOverrides& wish = request.overrides;
+        const double pairs = orderedPairs(request, plan.realCutoff, plan.sumImages);
+        const double products = 1 + (request.thermal ? 1 - std::log10(request.tolerance) : 0);
+        const double nyquist = plan.split->waveCutoff(error, phi);
+        const int digits = supportFor(error);
+        cost = std::numeric_limits<double>::infinity();
+        for (const WindowChoice& choice : {WindowChoice{digits, 1.0}, WindowChoice{digits - 1, digits <= 6 ? 1.24 : 1.14}}) {
+            const int support = (wish.windowSupport > 0 ? wish.windowSupport : choice.support);
+            std::array<int, 3> grid = gridFor(box, nyquist*choice.finer, support);
+            if (wish.grid[0] > 0)
+                grid = wish.grid;
+            const double points = double(grid[0])*grid[1]*grid[2];
+            const double estimate =
+                request.directSums ? CostModel::directStep(request.numParticles, points, pairs, products)
+                                   : CostModel::step(request.numParticles, points, support, pairs, products);
+            if (estimate < cost) {
+                cost = estimate;
+                plan.grid = grid;
+                plan.windowSupport = support;
+            }
+        }
+        plan.windowShape = (wish.windowShape > 0 ? wish.windowShape : shapeFor(error, plan.windowSupport));
+    }
+
+    const PlanRequest& request;
+    Lattice box;
+    double error, phi;
+};
+
+void checkRequest(const PlanRequest& r) {
+    std::ostringstream message;
+    const double xi = r.overrides.xi*r.radius;
+    if (r.overrides.xi > 0 && (xi < SMALLEST_XI || xi > LARGEST_XI))
+        message << "splitting parameter " << r.overrides.xi << " /nm is " << xi << " in units of 1/radius, outside ["
+                << SMALLEST_XI << ", " << LARGEST_XI << "]; call setSplittingParameter(0) for the automatic one";
+    for (int d = 0; d < 3; d++)
+        if (r.box.length(d) < 1e-3*r.radius)
+            message << "box vector " << d << " has length " << r.box.length(d) << " nm, less than 1e-3 of the radius "
+                    << r.radius << " nm; use a larger box";
+    if (!message.str().empty())
+        throw std::invalid_argument(message.str());
+}
+
+void checkPlan(const Plan& plan) {
+    std::ostringstream message;
+    for (int d = 0; d < 3; d++) {
+        if (plan.grid[d] > WIDEST_GRID)
+            message << "the grid needs " << plan.grid[d] << " points along box vector " << d << ", the limit is "
+                    << WIDEST_GRID << "; loosen the tolerance, choose a smaller splitting parameter or a smaller box";
+        else if (plan.grid[d] < plan.windowSupport)
+            message << "grid dimension " << plan.grid[d] << " along box vector " << d << " is smaller than the window support "
+                    << plan.windowSupport << "; use more grid points (setGridDimensions) or a smaller support (setWindowSupport)";
+        if (!message.str().empty())
+            throw std::invalid_argument(message.str());
+    }
+    if (plan.windowShape < Window::minShape(plan.windowSupport)) {
+        message << "window shape " << plan.windowShape << " is below " << Window::minShape(plan.windowSupport)
+                << " (1.57 support), where the window's transform has zeros; leave windowShape 0 for the automatic one";
+        throw std::invalid_argument(message.str());
+    }
+}
+
+} // namespace
+
+int nextFftSize(int n) {
+    for (;; n++) {
+        int rest = n;
+        for (int prime : {2, 3, 5, 7})
+            while (rest % prime == 0)
+                rest /= prime;
+        if (rest == 1)
+            return n;
+    }
+}
+
+Plan makePlan(const PlanRequest& request) {
+    checkRequest(request);
+    const Planner planner(request);
+    double cost = 0;
+    Plan best;
+    if (request.overrides.xi > 0)
+        best = planner.at(request.overrides.xi*request.radius, cost);
+    else {
+        const double longest = std::max({request.box.length(0), request.box.length(1), request.box.length(2)});
+        // From a range of about the whole box (few particles in a large box) to one below contact.
+        const double first = std::min(0.03, 6*request.radius/longest), last = 2.0, factor = 1.12;
+        double lowest = std::numeric_limits<double>::infinity();
+        for (double xi = first; xi < last; xi *= factor) {
+            const Plan plan = planner.at(xi, cost);
+            if (cost < lowest) {
+                lowest = cost;
+                best = plan;
+            }
+        }
+    }
+    checkPlan(best);
+    planner.finish(best);
+    checkPlan(best);
+    return best;
+}
+
+double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid, int windowSupport,
+                 double windowShape, double phi) {
+    constexpr int NODES = 24;
+    const Quadrature rule = gaussLegendre(NODES, -M_PI, M_PI);
+    const Window window(windowSupport, windowShape);
+    std::vector<double> aliasing(NODES), neighbour(NODES);
+    for (int i = 0; i < NODES; i++) {
+        aliasing[i] = window.aliasing(rule.nodes[i]);
+        neighbour[i] = window.transform(rule.nodes[i] + 2*M_PI)/window.transform(rule.nodes[i]);
+    }
+    Matrix3 waves = box.waveVectors()/(2*M_PI);
+    double nyquist = std::numeric_limits<double>::infinity();
+    for (int d = 0; d < 3; d++) {
+        waves.col(d) *= grid[d];
+        nyquist = std::min(nyquist, M_PI*grid[d]/box.length(d));
+    }
+    const double measure = double(grid[0])*grid[1]*grid[2]/box.volume()/(8*M_PI*M_PI*M_PI);
+    const double damping = std::pow(3.75/std::cbrt(box.volume()), 2); // the sum over modes starts at 2 pi/L, not at 0
+    const double density = 3*phi/(4*M_PI);
+    double pairs = 0, bias = 0;
+    Matrix3 ripple = Matrix3::Zero(); // (direction of the ripple, component of the force)
+    for (int i = 0; i < NODES/2; i++) // w(-k) = w(k): one half, twice
+        for (int j = 0; j < NODES; j++)
+            for (int l = 0; l < NODES; l++) {
+                const Vec3 k = waves*Vec3(rule.nodes[i], rule.nodes[j], rule.nodes[l]);
+                const double k2 = k.squaredNorm();
+                const double b = 6*M_PI*split.waveWeight(std::sqrt(k2))/(k2 + damping);
+                const double weight = 2*measure*rule.weights[i]*rule.weights[j]*rule.weights[l];
+                const double all = (1 + aliasing[i])*(1 + aliasing[j])*(1 + aliasing[l]) - 1;
+                pairs += weight*b*b*all*(2 + all); // (1 + all)^2 - 1 without cancellation
+                bias += weight*b*all;
+                const int node[3] = {i, j, l}, mirror[3] = {NODES - 1 - i, NODES - 1 - j, NODES - 1 - l};
+                const Vec3 transverse = Vec3::Ones() - k.cwiseProduct(k)/k2;
+                for (int d = 0; d < 3; d++)
+                    ripple.row(d) += 0.5*weight*b*(neighbour[node[d]] + neighbour[mirror[d]])*transverse.transpose();
+            }
+    // A particle at x feels a ripple 4 R_d cos(2 pi x_d/h_d) in its self mobility: mean square 8 R_d^2.
+    const double self = 8*ripple.squaredNorm()/3 + std::pow(2*bias/3, 2);
+    const double truncation = split.waveTruncation(nyquist, phi);
+    return std::sqrt(density*2/3*pairs + self + truncation*truncation);
+}
+
+} // namespace PSE::numerics

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_NUMERICS_PLAN_H_
+#define OPENMMPSE_NUMERICS_PLAN_H_
+
+// One tolerance becomes numbers here and nowhere else [T11-T16]. Lengths in nm.
+
+#include "numerics/Lattice.h"
+#include "numerics/Split.h"
+#include <array>
+#include <memory>
+#include <string>
+
+namespace PSE::numerics {
+
+enum class Precision { Single, Double };
+
+/** What a caller may prescribe; zero means automatic. */
+struct PlanOverrides {
+    double xi = 0, realCutoff = 0;
+    std::array<int, 3> grid = {0, 0, 0};
+    int windowSupport = 0;
+    double windowShape = 0, lanczosTolerance = 0;
+};
+
+/** What a Plan depends on. */
+struct PlanRequest {
+    Lattice box;
+    int numParticles;          ///< particles that feel the fluid
+    double radius;             ///< their hydrodynamic radius a
+    double tolerance;          ///< allowed relative error of M f
+    bool thermal;              ///< whether there will be noise (Lanczos iterations have a price)
+    double singleFloor;        ///< smallest tolerance the platform's single precision serves; infinite: always double
+    bool directSums;           ///< the platform sums over modes directly, without a grid (Reference)
+    PlanOverrides overrides;
+};
+
+/** Everything a platform needs to know about the numerics. */
+struct Plan {
+    std::shared_ptr<const Split> split; ///< in reduced units (lengths in a)
+    double a;                  ///< radius
+    double xi;                 ///< splitting parameter (1/nm)
+    double realCutoff;         ///< range of the real half
+    bool sumImages;            ///< the range exceeds half the box: sum explicitly over all images
+    std::array<int, 3> grid;   ///< M_d
+    int windowSupport;         ///< P
+    double windowShape;        ///< beta
+    double lanczosTolerance;   ///< relative error of the real-space noise
+    double tableError;         ///< absolute error allowed in tables, 1/(6 pi eta a)
+    double predictedError;     ///< rms error of M f for unit random forces, 1/(6 pi eta a)
+    Precision precision;
+
+    /** Number of grid points; double, because a request may exceed any integer. */
+    double gridPoints() const { return double(grid[0])*grid[1]*grid[2]; }
+};
+
+/**
+ * Choose all parameters so that each half is in error by at most tolerance/2 for unit random forces at volume
+ * fraction max(phi, 0.3), at the lowest cost by the model of PlanCost.h.
+ * @throws std::invalid_argument naming what cannot be met
+ */
+Plan makePlan(const PlanRequest& request);
+
+/** Smallest number >= n with no prime factor above 7: sizes that every FFT library does fast. */
+int nextFftSize(int n);
+
+/**
+ * Root mean square error of the wave half on a grid, for unit random forces at volume fraction phi, in 1/(6 pi eta a):
+ * aliases of the window in pairs and in the self mobility, and the modes beyond Nyquist [T14].
+ * @param box   in radii
+ */
+double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid, int windowSupport,
+                 double windowShape, double phi);
+
+} // namespace PSE::numerics
+
+#endif

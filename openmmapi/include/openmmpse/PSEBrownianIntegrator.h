@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_PSEBROWNIANINTEGRATOR_H_
+#define OPENMMPSE_PSEBROWNIANINTEGRATOR_H_
+
+#include "openmm/Integrator.h"
+#include "openmm/Kernel.h"
+#include "openmm/Vec3.h"
+#include "openmmpse/internal/windowsExportPSE.h"
+#include <map>
+#include <string>
+#include <vector>
+
+namespace PSE {
+
+/**
+ * The numerical parameters behind one tolerance: what a Context really uses, or, given to
+ * setNumericalParameters(), what it shall use. A zero (or empty) entry means "automatic".
+ * For a free-draining fluid xi = 0 and the grid is (0, 0, 0).
+ */
+struct OPENMM_EXPORT_PSE NumericalParameters {
+    std::string split;             ///< name of the real/wave split: "Hasimoto", or "none" without one
+    double xi = 0;                 ///< splitting parameter (in 1/nm)
+    double realCutoff = 0;         ///< range of the real-space half (in nm)
+    int gridDimensions[3] = {0, 0, 0}; ///< grid points along the three box vectors
+    int windowSupport = 0;         ///< grid points per axis that one particle touches, P
+    double windowShape = 0;        ///< shape beta of the Kaiser-Bessel window (dimensionless)
+    double lanczosTolerance = 0;   ///< relative error of the real-space noise, 2-norm
+    int lanczosIterations = 0;     ///< iterations of the last thermal step (reported, never set)
+    double predictedError = 0;     ///< the Plan's estimate of the error of M f, relative to |f|/(6 pi eta a) (reported, never set)
+    std::string precision;         ///< "single" or "double" arrays for the fluid (reported, never set)
+    int randomSeed = 0;            ///< seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
+};
+
+/**
+ * Brownian dynamics of spheres that feel each other through the solvent:
+ *
+ *     dx = M(x) f dt + sqrt(2 kT M(x)) dW                       [T1]
+ *
+ * M is the Rotne-Prager-Yamakawa mobility of a periodic fluid, evaluated by Positively Split
+ * Ewald (Fiore, Balboa Usabiaga, Donev, Swan, J. Chem. Phys. 146, 124116 (2017)) at a cost linear
+ * in the number of particles. Its divergence vanishes, so the Euler-Maruyama step used here has no
+ * drift term; it is of weak order 1 in the step size: halve the step to check a result. Masses do
+ * not enter the motion, except that massless particles do not move and are transparent to the
+ * fluid. Velocities reported by the Context are displacement / step size.
+ *
+ * Temperature, step size and shear rate take effect at the next step. Everything else is fixed when
+ * a Context is created; setting it later raises an exception.
+ */
+class OPENMM_EXPORT_PSE PSEBrownianIntegrator : public OpenMM::Integrator {
+public:
+    /** The mobility M. */
+    enum MobilityModel {
+        RotnePragerYamakawa = 0, ///< rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
+        ForceCoupling = 1,       ///< Gaussian envelopes, sigma = a/sqrt(pi)
+        FreeDraining = 2         ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
+    };
+    /** What surrounds the particles. */
+    enum FluidBoundary {
+        Automatic = 0, ///< periodic if any Force uses periodic boundary conditions, else unbounded
+        Periodic = 1,  ///< periodic in the box of the Context, zero mean flow
+        Unbounded = 2  ///< infinite solvent
+    };
+    /** How M is divided into a real-space and a wave-space half. */
+    enum Split {
+        AutomaticSplit = 0,
+        Prolate = 1,
+        Hasimoto = 2
+    };
+    /**
+     * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without noise
+     * @param viscosity    shear viscosity of the solvent (in Da/(nm ps)), > 0; 1 mPa s = 602.214 Da/(nm ps)
+     * @param radius       hydrodynamic radius of every particle without one of its own (in nm), > 0
+     * @param stepSize     time step (in ps), > 0
+     * @throws OpenMMException if an argument is not finite or outside its range
+     */
+    PSEBrownianIntegrator(double temperature, double viscosity, double radius, double stepSize);
+
+    /** Get the temperature of the solvent (in Kelvin). */
+    double getTemperature() const { return temperature; }
+    /** Set the temperature of the solvent (in Kelvin), >= 0. Takes effect at the next step. */
+    void setTemperature(double temperature);
+    /** Get the shear viscosity of the solvent (in Da/(nm ps)). */
+    double getViscosity() const { return viscosity; }
+    /** Set the shear viscosity of the solvent (in Da/(nm ps)), > 0. */
+    void setViscosity(double viscosity);
+    /** Get the default hydrodynamic radius (in nm). */
+    double getRadius() const { return radius; }
+    /** Set the default hydrodynamic radius (in nm), > 0. */
+    void setRadius(double radius);
+    /** Set the time step (in ps), > 0. Takes effect at the next step. */
+    void setStepSize(double size) override;
+    /**
+     * Get the hydrodynamic radius of one particle (in nm): its own, else the default.
+     * @param index  index of the particle in the System, >= 0
+     */
+    double getParticleRadius(int index) const;
+    /**
+     * Give one particle a hydrodynamic radius of its own.
+     * @param index   index of the particle in the System, >= 0
+     * @param radius  its radius (in nm), > 0
+     */
+    void setParticleRadius(int index, double radius);
+    /** Get the radii that differ from the default by a call of setParticleRadius(): index -> radius (in nm). */
+    const std::map<int, double>& getParticleRadii() const { return particleRadii; }
+    /** Get the relative error allowed in M f and in the covariance of the noise. */
+    double getErrorTolerance() const { return tolerance; }
+    /**
+     * Set the relative error allowed in the mobility: the computed u obeys
+     * |u - M f| <= tolerance max(|M f|, |f/(6 pi eta a)|) (2-norms over all particles) for random,
+     * uniform and balanced forces, and within 3 tolerance for the worst f there is. The covariance of
+     * the noise is that of a mobility that close to M.
+     * @param tolerance  dimensionless, in [1e-10, 1e-1]; default 1e-3
+     */
+    void setErrorTolerance(double tolerance);
+    /** Get the mobility model. */
+    MobilityModel getMobilityModel() const { return mobilityModel; }
+    /** Set the mobility model; default RotnePragerYamakawa. */
+    void setMobilityModel(MobilityModel model);
+    /** Get what surrounds the particles. */
+    FluidBoundary getFluidBoundary() const { return fluidBoundary; }
+    /** Set what surrounds the particles; default Automatic. */
+    void setFluidBoundary(FluidBoundary boundary);
+    /** Get the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). */
+    double getShearRate() const { return shearRate; }
+    /** Set the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). Takes effect at the next step. */
+    void setShearRate(double rate);
+    /** Get the requested split. */
+    Split getSplit() const { return split; }
+    /** Set how M is divided into its real-space and wave-space half; default AutomaticSplit. */
+    void setSplit(Split split);
+    /** Get the requested splitting parameter (in 1/nm); 0 = automatic. */
+    double getSplittingParameter() const { return requested.xi; }
+    /** Set the splitting parameter xi (in 1/nm), > 0, or 0 for automatic. It moves cost between the halves, not the result. */
+    void setSplittingParameter(double xi);
+    /** Get the requested grid dimensions; 0 = automatic. */
+    void getGridDimensions(int& nx, int& ny, int& nz) const;
+    /** Set the grid points along the three box vectors, each > 0, or all 0 for automatic. */
+    void setGridDimensions(int nx, int ny, int nz);
+    /** Get the requested window support; 0 = automatic. */
+    int getWindowSupport() const { return requested.windowSupport; }
+    /** Set the grid points per axis that one particle touches, in [3, 16], or 0 for automatic. */
+    void setWindowSupport(int support);
+    /** Get what setNumericalParameters() and the three setters above asked for. */
+    const NumericalParameters& getRequestedNumericalParameters() const { return requested; }
+    /**
+     * Reproduce the Plan of another Context: give what its getNumericalParameters() returned.
+     * Entries that are zero or empty stay automatic; reported entries (iterations, error, precision) are ignored,
+     * a non-zero randomSeed sets the seed.
+     */
+    void setNumericalParameters(const NumericalParameters& parameters);
+    /** Get the requested random number seed; 0 = drawn at Context creation. */
+    int getRandomNumberSeed() const { return randomSeed; }
+    /**
+     * Set the seed of the noise. The same seed, Plan and step give the same noise on every platform and any number
+     * of threads. 0 (the default) draws a new one for each Context; getNumericalParameters() tells it.
+     */
+    void setRandomNumberSeed(int seed);
+
+    /** Advance the simulation by a number of steps. @throws OpenMMException naming the first non-finite position or force */
+    void step(int steps) override;
+    /**
+     * Get the velocities M f that given forces cause at the current positions (without shear flow).
+     * The trajectory is unchanged.
+     * @param forces  one per particle (in kJ/(mol nm)); those on massless particles are ignored
+     * @return velocities, one per particle (in nm/ps); zero for massless particles
+     */
+    std::vector<OpenMM::Vec3> applyMobility(const std::vector<OpenMM::Vec3>& forces);
+    /**
+     * Draw independent samples of sqrt(2 kT dt M) dW at the current positions. They come from a stream of their own:
+     * repeated calls differ, the trajectory and its noise are unchanged. All are zero at temperature 0.
+     * @param count  number of samples, >= 0
+     * @return count*N displacements, sample by sample (in nm)
+     */
+    std::vector<OpenMM::Vec3> sampleBrownianDisplacements(int count);
+    /** Get the numerical parameters that the Context really uses, and the error they predict. */
+    NumericalParameters getNumericalParameters() const;
+    /** Tell in words which effects are active and why, the parameters in use, and what share of a step each costs. */
+    std::string describe() const;
+
+protected:
+    void initialize(OpenMM::ContextImpl& context) override;
+    void cleanup() override;
+    std::vector<std::string> getKernelNames() override;
+    double computeKineticEnergy() override;
+    bool kineticEnergyRequiresForce() const override { return false; }
+    void createCheckpoint(std::ostream& stream) const override;
+    void loadCheckpoint(std::istream& stream) override;
+    void serializeParameters(OpenMM::SerializationNode& node) const override;
+    void deserializeParameters(const OpenMM::SerializationNode& node) override;
+
+private:
+    void requireUnbound(const char* setter) const;
+    void requireBound(const char* method) const;
+
+    double temperature, viscosity, radius;
+    double tolerance = 1e-3, shearRate = 0;
+    MobilityModel mobilityModel = RotnePragerYamakawa;
+    FluidBoundary fluidBoundary = Automatic;
+    Split split = AutomaticSplit;
+    int randomSeed = 0;
+    std::map<int, double> particleRadii;
+    NumericalParameters requested;
+    OpenMM::Kernel kernel;
+};
+
+} // namespace PSE
+
+#endif

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_SCENE_H_
+#define OPENMMPSE_SCENE_H_
+
+#include "openmmpse/PSEBrownianIntegrator.h"
+#include "openmm/System.h"
+#include <string>
+#include <vector>
+
+namespace PSE {
+
+/** Which effects a System and an integrator's settings call for, decided once for every platform. */
+struct OPENMM_EXPORT_PSE Scene {
+    std::vector<int> mobile;     ///< indices of the particles that move and feel the fluid (mass > 0)
+    std::vector<double> radii;   ///< their hydrodynamic radii (nm)
+    int numMassless = 0;         ///< particles that do not move and are transparent to the fluid
+    bool hydrodynamics = false;  ///< particles feel each other through the fluid
+    std::string modelReason, boundaryReason;
+};
+
+/** Wall-clock time spent in one stage of the steps so far. */
+struct OPENMM_EXPORT_PSE StageTime {
+    std::string stage;
+    double seconds;
+};
+
+/**
+ * Decide which effects are active.
+ * @throws OpenMMException naming what is asked for but cannot be simulated, and what to do
+ */
+OPENMM_EXPORT_PSE Scene makeScene(const OpenMM::System& system, const PSEBrownianIntegrator& integrator);
+
+/** The text of PSEBrownianIntegrator::describe(). */
+std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator, const NumericalParameters& parameters,
+                          const std::vector<StageTime>& stages);
+
+} // namespace PSE
+
+#endif

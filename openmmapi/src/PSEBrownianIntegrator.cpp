@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT
+#include "openmmpse/PSEBrownianIntegrator.h"
+#include "openmmpse/PSEKernels.h"
+#include "openmmpse/internal/Scene.h"
+#include "openmm/Context.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/serialization/SerializationNode.h"
+#include <cmath>
+#include <sstream>
+
+using namespace OpenMM;
+using std::string;
+using std::vector;
+
+namespace PSE {
+
+namespace {
+
+constexpr double SMALLEST_TOLERANCE = 1e-10, LARGEST_TOLERANCE = 1e-1;
+constexpr int SMALLEST_SUPPORT = 3, LARGEST_SUPPORT = 16;
+
+[[noreturn]] void refuse(const string& message) {
+    throw OpenMMException("PSEBrownianIntegrator: " + message);
+}
+
+void requirePositive(const char* name, double value, const char* unit) {
+    if (std::isfinite(value) && value > 0)
+        return;
+    std::ostringstream message;
+    message << name << " is " << value << " " << unit << "; it must be positive and finite";
+    refuse(message.str());
+}
+
+void requireInRange(const char* name, double value, double low, double high) {
+    if (value >= low && value <= high)
+        return;
+    std::ostringstream message;
+    message << name << " is " << value << "; it must lie in [" << low << ", " << high << "]";
+    refuse(message.str());
+}
+
+} // namespace
+
+PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosity, double radius, double stepSize) {
+    setTemperature(temperature);
+    setViscosity(viscosity);
+    setRadius(radius);
+    setStepSize(stepSize);
+    setConstraintTolerance(1e-5);
+}
+
+void PSEBrownianIntegrator::requireUnbound(const char* setter) const {
+    if (context != NULL)
+        refuse(string(setter) + " was called after a Context had been created; what it sets is fixed from then on. "
+               "Set it before, or make a copy of the integrator and a new Context");
+}
+
+void PSEBrownianIntegrator::requireBound(const char* method) const {
+    if (context == NULL)
+        refuse(string(method) + " needs a Context: this integrator is not bound to a context! Create one first");
+}
+
+void PSEBrownianIntegrator::setTemperature(double value) {
+    if (!std::isfinite(value) || value < 0) {
+        std::ostringstream message;
+        message << "temperature is " << value << " K; it must be finite and not negative";
+        refuse(message.str());
+    }
+    temperature = value;
+}
+
+void PSEBrownianIntegrator::setViscosity(double value) {
+    requireUnbound("setViscosity");
+    requirePositive("viscosity", value, "Da/(nm ps)");
+    viscosity = value;
+}
+
+void PSEBrownianIntegrator::setRadius(double value) {
+    requireUnbound("setRadius");
+    requirePositive("radius", value, "nm");
+    radius = value;
+}
+
+void PSEBrownianIntegrator::setStepSize(double size) {
+    requirePositive("step size", size, "ps");
+    Integrator::setStepSize(size);
+}
+
+double PSEBrownianIntegrator::getParticleRadius(int index) const {
+    requireInRange("particle index", index, 0, 2147483647.0);
+    const auto own = particleRadii.find(index);
+    return own == particleRadii.end() ? radius : own->second;
+}
+
+void PSEBrownianIntegrator::setParticleRadius(int index, double value) {
+    requireUnbound("setParticleRadius");
+    requireInRange("particle index", index, 0, 2147483647.0);
+    requirePositive("particle radius", value, "nm");
+    particleRadii[index] = value;
+}
+
+void PSEBrownianIntegrator::setErrorTolerance(double value) {
+    requireUnbound("setErrorTolerance");
+    requireInRange("error tolerance", value, SMALLEST_TOLERANCE, LARGEST_TOLERANCE);
+    tolerance = value;
+}
+
+void PSEBrownianIntegrator::setMobilityModel(MobilityModel model) {
+    requireUnbound("setMobilityModel");
+    requireInRange("mobility model", model, RotnePragerYamakawa, FreeDraining);
+    mobilityModel = model;
+}
+
+void PSEBrownianIntegrator::setFluidBoundary(FluidBoundary boundary) {
+    requireUnbound("setFluidBoundary");
+    requireInRange("fluid boundary", boundary, Automatic, Unbounded);
+    fluidBoundary = boundary;
+}
+
+void PSEBrownianIntegrator::setShearRate(double rate) {
+    if (!std::isfinite(rate)) {
+        std::ostringstream message;
+        message << "shear rate is " << rate << " 1/ps; it must be finite";
+        refuse(message.str());
+    }
+    if (context != NULL && rate != 0) {
+        std::ostringstream message;
+        message << "setShearRate(" << rate << "): shear flow is not available; leave the shear rate at 0";
+        refuse(message.str());
+    }
+    shearRate = rate;
+}
+
+void PSEBrownianIntegrator::setSplit(Split value) {
+    requireUnbound("setSplit");
+    requireInRange("split", value, AutomaticSplit, Hasimoto);
+    split = value;
+}
+
+void PSEBrownianIntegrator::setSplittingParameter(double xi) {
+    requireUnbound("setSplittingParameter");
+    if (xi != 0)
+        requirePositive("splitting parameter", xi, "1/nm");
+    requested.xi = xi;
+}
+
+void PSEBrownianIntegrator::getGridDimensions(int& nx, int& ny, int& nz) const {
+    nx = requested.gridDimensions[0];
+    ny = requested.gridDimensions[1];
+    nz = requested.gridDimensions[2];
+}
+
+void PSEBrownianIntegrator::setGridDimensions(int nx, int ny, int nz) {
+    requireUnbound("setGridDimensions");
+    if (nx != 0 || ny != 0 || nz != 0)
+        for (int n : {nx, ny, nz})
+            requireInRange("grid dimension", n, SMALLEST_SUPPORT, 32768);
+    requested.gridDimensions[0] = nx;
+    requested.gridDimensions[1] = ny;
+    requested.gridDimensions[2] = nz;
+}
+
+void PSEBrownianIntegrator::setWindowSupport(int support) {
+    requireUnbound("setWindowSupport");
+    if (support != 0)
+        requireInRange("window support", support, SMALLEST_SUPPORT, LARGEST_SUPPORT);
+    requested.windowSupport = support;
+}
+
+void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& parameters) {
+    requireUnbound("setNumericalParameters");
+    PSEBrownianIntegrator trial(temperature, viscosity, radius, getStepSize()); // validates before anything is changed
+    trial.setSplittingParameter(parameters.xi);
+    trial.setGridDimensions(parameters.gridDimensions[0], parameters.gridDimensions[1], parameters.gridDimensions[2]);
+    trial.setWindowSupport(parameters.windowSupport);
+    if (parameters.realCutoff != 0)
+        requirePositive("realCutoff", parameters.realCutoff, "nm");
+    if (parameters.windowShape != 0)
+        requirePositive("windowShape", parameters.windowShape, "");
+    if (parameters.lanczosTolerance != 0)
+        requireInRange("lanczosTolerance", parameters.lanczosTolerance, 1e-14, 0.5);
+    if (parameters.split == "Hasimoto")
+        split = Hasimoto;
+    else if (parameters.split == "Prolate")
+        split = Prolate;
+    else if (parameters.split != "" && parameters.split != "none")
+        refuse("split is '" + parameters.split + "'; it must be 'Hasimoto', 'Prolate', 'none' or empty");
+    requested = trial.requested;
+    requested.realCutoff = parameters.realCutoff;
+    requested.windowShape = parameters.windowShape;
+    requested.lanczosTolerance = parameters.lanczosTolerance;
+    if (parameters.randomSeed != 0)
+        randomSeed = parameters.randomSeed;
+}
+
+void PSEBrownianIntegrator::setRandomNumberSeed(int seed) {
+    requireUnbound("setRandomNumberSeed");
+    randomSeed = seed;
+}
+
+void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
+    if (owner != NULL && &contextRef.getOwner() != owner)
+        throw OpenMMException("This Integrator is already bound to a context");
+    const Scene seen = makeScene(contextRef.getSystem(), *this);
+    Kernel created = contextRef.getPlatform().createKernel(IntegratePSEStepKernel::Name(), contextRef);
+    created.getAs<IntegratePSEStepKernel>().initialize(contextRef, *this, seen);
+    kernel = created;
+    context = &contextRef;
+    owner = &contextRef.getOwner();
+}
+
+void PSEBrownianIntegrator::cleanup() {
+    // Without a Context nothing here is in use: settings may be changed again, and another Context may be created.
+    kernel = Kernel();
+    context = NULL;
+    owner = NULL;
+}
+
+vector<string> PSEBrownianIntegrator::getKernelNames() {
+    return {IntegratePSEStepKernel::Name()};
+}
+
+double PSEBrownianIntegrator::computeKineticEnergy() {
+    return kernel.getAs<IntegratePSEStepKernel>().computeKineticEnergy(*context);
+}
+
+void PSEBrownianIntegrator::step(int steps) {
+    requireBound("step");
+    for (int i = 0; i < steps; i++) {
+        context->updateContextState();
+        kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
+        context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
+        kernel.getAs<IntegratePSEStepKernel>().execute(*context, *this);
+    }
+}
+
+vector<Vec3> PSEBrownianIntegrator::applyMobility(const vector<Vec3>& forces) {
+    requireBound("applyMobility");
+    if (static_cast<int>(forces.size()) != context->getSystem().getNumParticles()) {
+        std::ostringstream message;
+        message << "applyMobility was given " << forces.size() << " forces; the System has "
+                << context->getSystem().getNumParticles() << " particles";
+        refuse(message.str());
+    }
+    kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
+    return kernel.getAs<IntegratePSEStepKernel>().applyMobility(*context, forces);
+}
+
+vector<Vec3> PSEBrownianIntegrator::sampleBrownianDisplacements(int count) {
+    requireBound("sampleBrownianDisplacements");
+    if (count < 0) {
+        std::ostringstream message;
+        message << "sampleBrownianDisplacements was asked for " << count << " samples; the count cannot be negative";
+        refuse(message.str());
+    }
+    kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
+    return kernel.getAs<IntegratePSEStepKernel>().sampleBrownianDisplacements(*context, *this, count);
+}
+
+NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
+    requireBound("getNumericalParameters");
+    return kernel.getAs<const IntegratePSEStepKernel>().getNumericalParameters();
+}
+
+string PSEBrownianIntegrator::describe() const {
+    requireBound("describe");
+    const IntegratePSEStepKernel& step = kernel.getAs<const IntegratePSEStepKernel>();
+    return describeScene(makeScene(context->getSystem(), *this), *this, step.getNumericalParameters(), step.getStageTimes());
+}
+
+void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
+    kernel.getAs<const IntegratePSEStepKernel>().createCheckpoint(stream);
+}
+
+void PSEBrownianIntegrator::loadCheckpoint(std::istream& stream) {
+    kernel.getAs<IntegratePSEStepKernel>().loadCheckpoint(stream);
+}
+
+void PSEBrownianIntegrator::serializeParameters(SerializationNode& node) const {
+    unsigned long long step, sample;
+    kernel.getAs<const IntegratePSEStepKernel>().getCounters(step, sample);
+    node.setIntProperty("version", 1);
+    node.setStringProperty("noiseStep", std::to_string(step));
+    node.setStringProperty("noiseSample", std::to_string(sample));
+}
+
+void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node) {
+    if (node.getIntProperty("version") != 1)
+        refuse("the integrator parameters in this State have version " + std::to_string(node.getIntProperty("version")) +
+               "; this version of openmmpse reads version 1");
+    kernel.getAs<IntegratePSEStepKernel>().setCounters(std::stoull(node.getStringProperty("noiseStep")),
+                                                       std::stoull(node.getStringProperty("noiseSample")));
+}
+
+} // namespace PSE

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include "openmmpse/internal/Scene.h"
+#include "openmm/MonteCarloAnisotropicBarostat.h"
+#include "openmm/MonteCarloBarostat.h"
+#include "openmm/MonteCarloFlexibleBarostat.h"
+#include "openmm/MonteCarloMembraneBarostat.h"
+#include "openmm/OpenMMException.h"
+#include <sstream>
+
+using namespace OpenMM;
+using std::string;
+
+namespace PSE {
+
+namespace {
+
+[[noreturn]] void refuse(const string& message) {
+    throw OpenMMException("PSEBrownianIntegrator: " + message);
+}
+
+const char* nameOfBarostat(const Force& force) {
+    if (dynamic_cast<const MonteCarloBarostat*>(&force) != NULL)
+        return "MonteCarloBarostat";
+    if (dynamic_cast<const MonteCarloAnisotropicBarostat*>(&force) != NULL)
+        return "MonteCarloAnisotropicBarostat";
+    if (dynamic_cast<const MonteCarloMembraneBarostat*>(&force) != NULL)
+        return "MonteCarloMembraneBarostat";
+    if (dynamic_cast<const MonteCarloFlexibleBarostat*>(&force) != NULL)
+        return "MonteCarloFlexibleBarostat";
+    return NULL;
+}
+
+void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) {
+    if (system.getNumParticles() == 0)
+        refuse("the System has no particles; add at least one with System.addParticle");
+    if (system.getNumConstraints() > 0) {
+        std::ostringstream message;
+        message << "the System has " << system.getNumConstraints() << " constraints, and constrained dynamics with hydrodynamics "
+                << "is not available; use stiff bonds instead (create the System with constraints=None, rigidWater=False)";
+        refuse(message.str());
+    }
+    for (int i = 0; i < system.getNumForces(); i++)
+        if (const char* name = nameOfBarostat(system.getForce(i)))
+            refuse(string("the System has a ") + name + ", and boxes that a barostat moves are not available; remove that Force");
+    for (const auto& own : integrator.getParticleRadii())
+        if (own.first >= system.getNumParticles()) {
+            std::ostringstream message;
+            message << "setParticleRadius was called for particle " << own.first << "; the System has particles 0 to "
+                    << system.getNumParticles() - 1;
+            refuse(message.str());
+        }
+}
+
+void checkSettings(const PSEBrownianIntegrator& integrator) {
+    if (integrator.getShearRate() != 0) {
+        std::ostringstream message;
+        message << "setShearRate(" << integrator.getShearRate() << "): shear flow is not available; leave the shear rate at 0";
+        refuse(message.str());
+    }
+    if (integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
+        refuse("setMobilityModel(ForceCoupling): this mobility is not available; use RotnePragerYamakawa or FreeDraining");
+    if (integrator.getSplit() == PSEBrownianIntegrator::Prolate)
+        refuse("setSplit(Prolate): this split is not available; use AutomaticSplit or Hasimoto");
+}
+
+void checkBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {
+    const auto boundary = integrator.getFluidBoundary();
+    if (boundary == PSEBrownianIntegrator::Unbounded)
+        refuse("setFluidBoundary(Unbounded): an unbounded fluid is not available; use Periodic with a box that is large "
+               "against the molecule, or setMobilityModel(FreeDraining)");
+    if (boundary == PSEBrownianIntegrator::Periodic)
+        scene.boundaryReason = "as set by setFluidBoundary";
+    else if (system.usesPeriodicBoundaryConditions())
+        scene.boundaryReason = "because a Force uses periodic boundary conditions";
+    else
+        refuse("setFluidBoundary(Automatic) means an unbounded fluid here, because no Force uses periodic boundary conditions, "
+               "and an unbounded fluid is not available; call setFluidBoundary(Periodic) for a fluid that is periodic in the "
+               "System's box");
+}
+
+void checkRadii(const Scene& scene) {
+    for (size_t i = 0; i < scene.radii.size(); i++)
+        if (scene.radii[i] != scene.radii[0]) {
+            std::ostringstream message;
+            message << "setParticleRadius: particle " << scene.mobile[i] << " has radius " << scene.radii[i] << " nm, particle "
+                    << scene.mobile[0] << " has " << scene.radii[0] << " nm, and unequal radii are not available with "
+                    << "hydrodynamics; give all particles one radius, or use setMobilityModel(FreeDraining)";
+            refuse(message.str());
+        }
+}
+
+} // namespace
+
+Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
+    checkSystem(system, integrator);
+    checkSettings(integrator);
+    Scene scene;
+    for (int i = 0; i < system.getNumParticles(); i++) {
+        if (system.getParticleMass(i) == 0) {
+            scene.numMassless++;
+            continue;
+        }
+        scene.mobile.push_back(i);
+        scene.radii.push_back(integrator.getParticleRadius(i));
+    }
+    scene.hydrodynamics = (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
+    if (scene.hydrodynamics) {
+        checkBoundary(system, integrator, scene);
+        checkRadii(scene);
+        scene.modelReason = "Rotne-Prager-Yamakawa, equal radii";
+    }
+    else
+        scene.modelReason = "setMobilityModel(FreeDraining) was called";
+    return scene;
+}
+
+} // namespace PSE

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include "CpuEngine.h"
+#include "HostStepKernel.h"
+#include "Memory.h"
+#include "openmm/KernelFactory.h"
+#include "openmm/cpu/CpuPlatform.h"
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/windowsExport.h"
+
+using namespace OpenMM;
+
+namespace PSE {
+
+namespace {
+
+/** Single precision adds 4e-7 to the error of the fluid: from this tolerance on it is hidden. */
+constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
+
+class CpuEngineFactory : public EngineFactory {
+public:
+    explicit CpuEngineFactory(ThreadPool& pool) : pool(pool) {}
+    void adapt(numerics::PlanRequest& request) const override {
+        request.singleFloor = SINGLE_PRECISION_FLOOR;
+        request.directSums = false;
+    }
+    std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+                                           const std::vector<int>& indices, StageClock& clock) const override {
+        if (plan.precision == numerics::Precision::Single)
+            return make<float>(plan, box, viscosity, indices, clock);
+        return make<double>(plan, box, viscosity, indices, clock);
+    }
+
+private:
+    template <class Real>
+    std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+                                         const std::vector<int>& indices, StageClock& clock) const {
+        requireMemory(plan, CpuWaveSpace<Real>::bytesPerGridPoint());
+        return std::unique_ptr<MobilityEngine>(new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
+    }
+    ThreadPool& pool;
+};
+
+class CpuKernelFactory : public KernelFactory {
+public:
+    KernelImpl* createKernelImpl(std::string name, const Platform& platform, ContextImpl& context) const override {
+        auto& data = *static_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
+        ThreadPool& pool = CpuPlatform::getPlatformData(context).threads;
+        return new HostStepKernel(name, platform, data, std::unique_ptr<EngineFactory>(new CpuEngineFactory(pool)));
+    }
+};
+
+} // namespace
+
+} // namespace PSE
+
+extern "C" OPENMM_EXPORT void registerPlatforms() {
+}
+
+extern "C" OPENMM_EXPORT void registerKernelFactories() {
+    for (int i = 0; i < Platform::getNumPlatforms(); i++)
+        if (Platform::getPlatform(i).getName() == "CPU")
+            Platform::getPlatform(i).registerKernelFactory(PSE::IntegratePSEStepKernel::Name(), new PSE::CpuKernelFactory());
+}

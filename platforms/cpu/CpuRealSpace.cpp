@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+#include "CpuRealSpace.h"
+#include <algorithm>
+#include <cmath>
+
+using namespace PSE::numerics;
+
+namespace PSE {
+
+namespace {
+
+constexpr int LIST_BLOCK = 8;           ///< particles per block of OpenMM's list
+constexpr double SKIN = 0.5;            ///< in radii: the list survives until a particle has moved half of it
+constexpr double FLOAT_MARGIN = 2e-6;   ///< of the box: what the list's single precision positions may be off
+
+/** Powers of a polynomial, highest first. */
+template <class Real>
+std::vector<Real> hornerOrder(const Polynomial& p) {
+    return std::vector<Real>(p.powers.rbegin(), p.powers.rend());
+}
+
+} // namespace
+
+template <class Real>
+CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads, OpenMM::ThreadPool& pool)
+    : box(box), a(plan.a), range(plan.realCutoff), sumImages(plan.sumImages), threads(threads), pool(pool), list(LIST_BLOCK) {
+    const RealTable table = makeRealTable(*plan.split, range/a, plan.tableError);
+    self = Real(table.self);
+    coefficientsF = hornerOrder<Real>(table.F);
+    coefficientsC = hornerOrder<Real>(table.C);
+    skin = std::min(SKIN*a, 0.5*box.smallestWidth() - range);
+}
+
+template <class Real>
+bool CpuRealSpace<Real>::listIsValid(const std::vector<Vec3>& x) const {
+    if (x.size() != atBuild.size())
+        return false;
+    const double margin = FLOAT_MARGIN*(box.length(0) + box.length(1) + box.length(2));
+    const double allowed = 0.5*(skin - margin);
+    for (size_t i = 0; i < x.size(); i++)
+        if (!((x[i] - atBuild[i]).squaredNorm() < allowed*std::fabs(allowed)))
+            return false;
+    return true;
+}
+
+template <class Real>
+void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& x) {
+    positions.resize(x.size());
+    threads.runBlocks(static_cast<int>(x.size()), [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            positions[i] = box.wrapped(x[i]);
+    });
+    count.resize(x.size());
+    if (sumImages)
+        fillRowsWithImages();
+    else {
+        if (!listIsValid(x))
+            buildList(x);
+        fillRows();
+    }
+}
+
+template <class Real>
+void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
+    const int n = static_cast<int>(x.size());
+    atBuild = x;
+    if (listPositions.size() != 4*n) {
+        listPositions.resize(4*n);
+        noExclusions.resize(n);
+    }
+    for (int i = 0; i < n; i++)
+        for (int d = 0; d < 4; d++)
+            listPositions[4*i + d] = (d < 3 ? float(positions[i][d]) : 0);
+    OpenMM::Vec3 vectors[3];
+    for (int d = 0; d < 3; d++)
+        vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
+    list.computeNeighborList(n, listPositions, noExclusions, vectors, true, float(range + skin), pool);
+
+    // From pairs in blocks, each once, to complete rows: count, then fill, then sort each row.
+    start.assign(n + 1, 0);
+    const auto forEachPair = [&](auto work) {
+        const std::vector<int32_t>& sorted = list.getSortedAtoms();
+        for (int block = 0; block < list.getNumBlocks(); block++) {
+            OpenMM::CpuNeighborList::NeighborIterator neighbours = list.getNeighborIterator(block);
+            while (neighbours.next())
+                for (int k = 0; k < LIST_BLOCK; k++)
+                    if ((neighbours.getExclusions() & (1 << k)) == 0)
+                        work(sorted[LIST_BLOCK*block + k], neighbours.getNeighbor());
+        }
+    };
+    forEachPair([&](int i, int j) { start[i + 1]++, start[j + 1]++; });
+    for (int i = 0; i < n; i++)
+        start[i + 1] += start[i];
+    candidates.resize(start[n]);
+    entries.resize(start[n]);
+    std::vector<int64_t> next(start.begin(), start.end() - 1);
+    forEachPair([&](int i, int j) { candidates[next[i]++] = j, candidates[next[j]++] = i; });
+    threads.runBlocks(n, [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            std::sort(candidates.begin() + start[i], candidates.begin() + start[i + 1]);
+    });
+}
+
+/** @return whether the pair is in range and was written */
+template <class Real>
+bool CpuRealSpace<Real>::addEntry(int j, const Vec3& d, Entry* entry) const {
+    if (d.squaredNorm() >= range*range)
+        return false;
+    const Vec3 reduced = d/a;
+    *entry = {j, 0, 0, Real(reduced[0]), Real(reduced[1]), Real(reduced[2])};
+    return true;
+}
+
+template <class Real>
+void CpuRealSpace<Real>::fillRows() {
+    const PairPolynomials<Real> table = {Real(range/a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1,
+                                         coefficientsF.data(), coefficientsC.data()};
+    threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
+        for (int i = from; i < to; i++) {
+            Entry* row = entries.data() + start[i];
+            int found = 0;
+            for (int64_t k = start[i]; k < start[i + 1]; k++)
+                found += addEntry(candidates[k], box.minimumImage(positions[i] - positions[candidates[k]]), row + found);
+            count[i] = found;
+            evaluatePairs(table, found, row);
+        }
+    });
+}
+
+/** For ranges beyond half the box: every image of every pair. Few particles, or a range never chosen automatically. */
+template <class Real>
+void CpuRealSpace<Real>::fillRowsWithImages() {
+    const PairPolynomials<Real> table = {Real(range/a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1,
+                                         coefficientsF.data(), coefficientsC.data()};
+    const std::vector<Vec3> images = box.imagesWithin(range);
+    const int n = static_cast<int>(positions.size());
+    std::vector<std::vector<Entry>> found(n);
+    threads.run(n, [&](int i, int) {
+        Entry entry;
+        for (int j = 0; j < n; j++)
+            for (const Vec3& image : images)
+                if ((i != j || image != Vec3::Zero()) && addEntry(j, positions[i] - positions[j] + image, &entry))
+                    found[i].push_back(entry);
+        evaluatePairs(table, static_cast<int>(found[i].size()), found[i].data());
+    });
+    start.assign(n + 1, 0);
+    entries.clear();
+    for (int i = 0; i < n; i++) {
+        count[i] = static_cast<int32_t>(found[i].size());
+        start[i + 1] = start[i] + count[i];
+        entries.insert(entries.end(), found[i].begin(), found[i].end());
+    }
+}
+
+template <class Real>
+PairRows<Real> CpuRealSpace<Real>::rows() const {
+    return {self, start.data(), count.data(), entries.data()};
+}
+
+template <class Real>
+void CpuRealSpace<Real>::multiply(const Vector& v, Vector& out) const {
+    const PairRows<Real> matrix = rows();
+    threads.runBlocks(static_cast<int>(positions.size()),
+                      [&](int from, int to, int) { multiplyRows(matrix, from, to, v.data(), out.data()); });
+}
+
+template <class Real>
+typename CpuRealSpace<Real>::Vector& CpuRealSpace<Real>::basis(int i) {
+    while (static_cast<int>(krylov.size()) <= i)
+        krylov.emplace_back();
+    krylov[i].resize(3*positions.size());
+    return krylov[i];
+}
+
+template <class Real>
+double CpuRealSpace<Real>::dot(const Vector& v, const Vector& w) const {
+    const int n = static_cast<int>(v.size());
+    partial.assign(Threads::blocks(n), 0.0);
+    threads.runBlocks(n, [&](int from, int to, int block) {
+        double sum = 0;
+        for (int i = from; i < to; i++)
+            sum += double(v[i])*double(w[i]);
+        partial[block] = sum;
+    });
+    double total = 0;
+    for (double sum : partial)
+        total += sum;
+    return total;
+}
+
+template <class Real>
+void CpuRealSpace<Real>::scaledCopy(double s, const Vector& v, Vector& out) const {
+    threads.runBlocks(static_cast<int>(v.size()), [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            out[i] = Real(s)*v[i];
+    });
+}
+
+template <class Real>
+void CpuRealSpace<Real>::addScaled(double s, const Vector& v, Vector& out) const {
+    threads.runBlocks(static_cast<int>(v.size()), [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            out[i] += Real(s)*v[i];
+    });
+}
+
+template class CpuRealSpace<float>;
+template class CpuRealSpace<double>;
+
+} // namespace PSE

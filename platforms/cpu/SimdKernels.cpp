@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+#include "SimdKernels.h"
+#include "numerics/Rpy.h"
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "SimdKernels.cpp"
+#include <hwy/foreach_target.h> // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+
+// Plain loops over padded rows: inside these namespaces the compiler may use the instruction set in question, and does.
+HWY_BEFORE_NAMESPACE();
+namespace PSE {
+namespace HWY_NAMESPACE {
+
+template <int PADDED, class Real>
+HWY_INLINE void evaluateWindowsPadded(const WindowPolynomials<Real>& window, const Real* HWY_RESTRICT t, int n,
+                                      Real* HWY_RESTRICT weights) {
+    for (int row = 0; row < 3*n; row++) {
+        Real w[PADDED];
+        for (int j = 0; j < PADDED; j++)
+            w[j] = window.coefficients[j];
+        for (int power = 1; power <= window.degree; power++)
+            for (int j = 0; j < PADDED; j++)
+                w[j] = w[j]*t[row] + window.coefficients[power*PADDED + j];
+        for (int j = 0; j < PADDED; j++)
+            weights[row*size_t(PADDED) + j] = w[j];
+    }
+}
+
+template <class Real>
+HWY_INLINE void evaluateWindowsAny(const WindowPolynomials<Real>& window, const Real* t, int n, Real* weights) {
+    if (window.padded == 4)
+        evaluateWindowsPadded<4>(window, t, n, weights);
+    else if (window.padded == 8)
+        evaluateWindowsPadded<8>(window, t, n, weights);
+    else
+        evaluateWindowsPadded<16>(window, t, n, weights);
+}
+
+template <int PADDED, class Real>
+HWY_INLINE void spreadParticle(const GridParticles<Real>& p, int particle, int dx, Real* const planes[3]) {
+    const Real* weights = p.weights + size_t(particle)*3*PADDED;
+    const int* first = p.first + 3*size_t(particle);
+    Real row[3][PADDED];
+    for (int c = 0; c < 3; c++)
+        for (int j = 0; j < PADDED; j++)
+            row[c][j] = p.forces[3*size_t(particle) + c]*weights[dx]*weights[2*PADDED + j];
+    int y = first[1];
+    for (int dy = 0; dy < p.support; dy++) {
+        const Real wy = weights[PADDED + dy];
+        const size_t offset = y*p.rowLength + first[2];
+        for (int c = 0; c < 3; c++) {
+            Real* HWY_RESTRICT target = planes[c] + offset;
+            for (int j = 0; j < PADDED; j++)
+                target[j] += wy*row[c][j];
+        }
+        if (++y == p.size[1])
+            y = 0;
+    }
+}
+
+template <int PADDED, class Real>
+HWY_INLINE void spreadPlanePadded(const GridParticles<Real>& p, int x, Real* const planes[3]) {
+    const size_t rows = p.size[1];
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < rows*p.rowLength; i++)
+            planes[c][i] = 0;
+    for (int dx = 0; dx < p.support; dx++) {
+        const int column = (x - dx + p.size[0]) % p.size[0];
+        const int begin = p.columnStart[column*rows], end = p.columnStart[(column + 1)*rows];
+        for (int particle = begin; particle < end; particle++)
+            spreadParticle<PADDED>(p, particle, dx, planes);
+    }
+    for (int c = 0; c < 3; c++)
+        for (size_t y = 0; y < rows; y++) {
+            Real* row = planes[c] + y*p.rowLength;
+            for (int z = p.size[2]; z < p.size[2] + PADDED - 1; z++)
+                row[z % p.size[2]] += row[z];
+        }
+}
+
+template <class Real>
+HWY_INLINE void spreadPlaneAny(const GridParticles<Real>& p, int x, Real* const planes[3]) {
+    if (p.padded == 4)
+        spreadPlanePadded<4>(p, x, planes);
+    else if (p.padded == 8)
+        spreadPlanePadded<8>(p, x, planes);
+    else
+        spreadPlanePadded<16>(p, x, planes);
+}
+
+template <int PADDED, class Real>
+HWY_INLINE void gatherPadded(const GridParticles<Real>& p, int from, int to, const Real* const grids[3], Real* HWY_RESTRICT u) {
+    for (int particle = from; particle < to; particle++) {
+        const Real* weights = p.weights + size_t(particle)*3*PADDED;
+        const int* first = p.first + 3*size_t(particle);
+        Real sum[3][PADDED] = {};
+        int x = first[0];
+        for (int dx = 0; dx < p.support; dx++) {
+            int y = first[1];
+            for (int dy = 0; dy < p.support; dy++) {
+                const Real w = weights[dx]*weights[PADDED + dy];
+                const size_t offset = (size_t(x)*p.size[1] + y)*p.rowLength + first[2];
+                for (int c = 0; c < 3; c++)
+                    for (int j = 0; j < PADDED; j++)
+                        sum[c][j] += w*grids[c][offset + j];
+                if (++y == p.size[1])
+                    y = 0;
+            }
+            if (++x == p.size[0])
+                x = 0;
+        }
+        for (int c = 0; c < 3; c++) {
+            Real total = 0;
+            for (int j = 0; j < PADDED; j++)
+                total += sum[c][j]*weights[2*PADDED + j];
+            u[3*size_t(particle) + c] = total;
+        }
+    }
+}
+
+template <class Real>
+HWY_INLINE void gatherAny(const GridParticles<Real>& p, int from, int to, const Real* const grids[3], Real* u) {
+    if (p.padded == 4)
+        gatherPadded<4>(p, from, to, grids, u);
+    else if (p.padded == 8)
+        gatherPadded<8>(p, from, to, grids, u);
+    else
+        gatherPadded<16>(p, from, to, grids, u);
+}
+
+template <class Real>
+HWY_INLINE void evaluatePairsAny(const PairPolynomials<Real>& table, int count, typename PairRows<Real>::Entry* entries) {
+    for (int i = 0; i < count; i++) {
+        auto& e = entries[i];
+        const Real r2 = e.dx*e.dx + e.dy*e.dy + e.dz*e.dz;
+        const Real t = 2*r2/(table.rc*table.rc) - 1, r = std::sqrt(r2);
+        Real waveF = table.F[0], waveC = table.C[0], F, G;
+        for (int power = 1; power <= table.degreeF; power++)
+            waveF = waveF*t + table.F[power];
+        for (int power = 1; power <= table.degreeC; power++)
+            waveC = waveC*t + table.C[power];
+        numerics::rpyScalars(r, F, G);
+        e.F = F - waveF;
+        e.C = (r2 > 0 ? (G - F)/r2 : 0) - waveC;
+    }
+}
+
+template <class Real>
+HWY_INLINE void multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real* HWY_RESTRICT v,
+                                Real* HWY_RESTRICT out) {
+    for (int i = from; i < to; i++) {
+        Real x = rows.self*v[3*size_t(i)], y = rows.self*v[3*size_t(i) + 1], z = rows.self*v[3*size_t(i) + 2];
+        const auto* entry = rows.entries + rows.start[i];
+        for (int k = 0; k < rows.count[i]; k++) {
+            const auto& e = entry[k];
+            const Real* w = v + 3*size_t(e.neighbour);
+            const Real along = e.C*(e.dx*w[0] + e.dy*w[1] + e.dz*w[2]);
+            x += e.F*w[0] + along*e.dx;
+            y += e.F*w[1] + along*e.dy;
+            z += e.F*w[2] + along*e.dz;
+        }
+        out[3*size_t(i)] = x;
+        out[3*size_t(i) + 1] = y;
+        out[3*size_t(i) + 2] = z;
+    }
+}
+
+/** noise[6][blockLength]: real and imaginary parts of the three components, for kept modes. */
+template <class Real>
+HWY_INLINE void fillModeNoise(const WaveRow<Real>& row, int nx, const Real* factors, Real* noise) {
+    for (int nz = 0; nz <= row.size[2]/2; nz++) {
+        if (factors[nz] == 0)
+            continue;
+        std::complex<Real> z[3];
+        numerics::modeNoise(row.key, nx, row.ny, nz, z);
+        for (int c = 0; c < 3; c++) {
+            noise[2*c*row.blockLength + nz] = z[c].real();
+            noise[(2*c + 1)*row.blockLength + nz] = z[c].imag();
+        }
+    }
+}
+
+template <class Real>
+HWY_INLINE void scaleWavesAny(const WaveRow<Real>& row, std::complex<Real>* const blocks[3], Real* HWY_RESTRICT scratch) {
+    const Real* b = row.waveVectors;
+    for (size_t i = 0; row.noise == 0 && i < waveScratch(row.blockLength); i++)
+        scratch[i] = 0;
+    for (int x = 0; x < row.size[0]; x++) {
+        const int nx = (2*x <= row.size[0] ? x : x - row.size[0]);
+        const Real* factors = row.factors + x*row.blockLength;
+        if (row.noise != 0)
+            fillModeNoise(row, nx, factors, scratch);
+        Real* wave[3];
+        for (int c = 0; c < 3; c++)
+            wave[c] = reinterpret_cast<Real*>(blocks[c] + x*row.blockLength);
+        for (int nz = 0; nz <= row.size[2]/2; nz++) {
+            const Real D = factors[nz];
+            if (D == 0) { // dropped modes; their noise has not been drawn
+                for (int c = 0; c < 3; c++)
+                    wave[c][2*nz] = wave[c][2*nz + 1] = 0;
+                continue;
+            }
+            const Real k[3] = {b[0]*nx + b[1]*row.ny + b[2]*nz, b[3]*nx + b[4]*row.ny + b[5]*nz,
+                               b[6]*nx + b[7]*row.ny + b[8]*nz};
+            const Real inverse = 1/(k[0]*k[0] + k[1]*k[1] + k[2]*k[2]), force = row.forced ? D : 0;
+            const Real amplitude = row.noise*std::sqrt(D);
+            for (int part = 0; part < 2; part++) { // real, imaginary
+                Real u[3], along = 0;
+                for (int c = 0; c < 3; c++) {
+                    u[c] = amplitude*scratch[(2*c + part)*row.blockLength + nz];
+                    if (row.forced)
+                        u[c] += force*wave[c][2*nz + part];
+                    along += k[c]*u[c];
+                }
+                for (int c = 0; c < 3; c++)
+                    wave[c][2*nz + part] = u[c] - along*inverse*k[c];
+            }
+        }
+    }
+}
+
+// One name per precision, because dispatch tables hold functions, not templates.
+void evaluateWindowsF(const WindowPolynomials<float>& w, const float* t, int n, float* out) { evaluateWindowsAny(w, t, n, out); }
+void evaluateWindowsD(const WindowPolynomials<double>& w, const double* t, int n, double* out) { evaluateWindowsAny(w, t, n, out); }
+void spreadPlaneF(const GridParticles<float>& p, int x, float* const planes[3]) { spreadPlaneAny(p, x, planes); }
+void spreadPlaneD(const GridParticles<double>& p, int x, double* const planes[3]) { spreadPlaneAny(p, x, planes); }
+void gatherF(const GridParticles<float>& p, int from, int to, const float* const g[3], float* u) { gatherAny(p, from, to, g, u); }
+void gatherD(const GridParticles<double>& p, int from, int to, const double* const g[3], double* u) { gatherAny(p, from, to, g, u); }
+void evaluatePairsF(const PairPolynomials<float>& t, int n, PairRows<float>::Entry* e) { evaluatePairsAny(t, n, e); }
+void evaluatePairsD(const PairPolynomials<double>& t, int n, PairRows<double>::Entry* e) { evaluatePairsAny(t, n, e); }
+void multiplyRowsF(const PairRows<float>& r, int from, int to, const float* v, float* out) { multiplyRowsAny(r, from, to, v, out); }
+void multiplyRowsD(const PairRows<double>& r, int from, int to, const double* v, double* out) { multiplyRowsAny(r, from, to, v, out); }
+void scaleWavesF(const WaveRow<float>& r, std::complex<float>* const b[3], float* s) { scaleWavesAny(r, b, s); }
+void scaleWavesD(const WaveRow<double>& r, std::complex<double>* const b[3], double* s) { scaleWavesAny(r, b, s); }
+const char* targetName() { return hwy::TargetName(HWY_TARGET); }
+
+} // namespace HWY_NAMESPACE
+} // namespace PSE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace PSE {
+
+HWY_EXPORT(evaluateWindowsF);
+HWY_EXPORT(evaluateWindowsD);
+HWY_EXPORT(spreadPlaneF);
+HWY_EXPORT(spreadPlaneD);
+HWY_EXPORT(gatherF);
+HWY_EXPORT(gatherD);
+HWY_EXPORT(evaluatePairsF);
+HWY_EXPORT(evaluatePairsD);
+HWY_EXPORT(multiplyRowsF);
+HWY_EXPORT(multiplyRowsD);
+HWY_EXPORT(scaleWavesF);
+HWY_EXPORT(scaleWavesD);
+HWY_EXPORT(targetName);
+
+void evaluateWindows(const WindowPolynomials<float>& w, const float* t, int n, float* out) {
+    HWY_DYNAMIC_DISPATCH(evaluateWindowsF)(w, t, n, out);
+}
+void evaluateWindows(const WindowPolynomials<double>& w, const double* t, int n, double* out) {
+    HWY_DYNAMIC_DISPATCH(evaluateWindowsD)(w, t, n, out);
+}
+void spreadPlane(const GridParticles<float>& p, int x, float* const planes[3]) {
+    HWY_DYNAMIC_DISPATCH(spreadPlaneF)(p, x, planes);
+}
+void spreadPlane(const GridParticles<double>& p, int x, double* const planes[3]) {
+    HWY_DYNAMIC_DISPATCH(spreadPlaneD)(p, x, planes);
+}
+void gatherVelocities(const GridParticles<float>& p, int from, int to, const float* const grids[3], float* u) {
+    HWY_DYNAMIC_DISPATCH(gatherF)(p, from, to, grids, u);
+}
+void gatherVelocities(const GridParticles<double>& p, int from, int to, const double* const grids[3], double* u) {
+    HWY_DYNAMIC_DISPATCH(gatherD)(p, from, to, grids, u);
+}
+void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries) {
+    HWY_DYNAMIC_DISPATCH(evaluatePairsF)(table, count, entries);
+}
+void evaluatePairs(const PairPolynomials<double>& table, int count, PairRows<double>::Entry* entries) {
+    HWY_DYNAMIC_DISPATCH(evaluatePairsD)(table, count, entries);
+}
+void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out) {
+    HWY_DYNAMIC_DISPATCH(multiplyRowsF)(rows, from, to, v, out);
+}
+void multiplyRows(const PairRows<double>& rows, int from, int to, const double* v, double* out) {
+    HWY_DYNAMIC_DISPATCH(multiplyRowsD)(rows, from, to, v, out);
+}
+void scaleWaves(const WaveRow<float>& row, std::complex<float>* const blocks[3], float* scratch) {
+    HWY_DYNAMIC_DISPATCH(scaleWavesF)(row, blocks, scratch);
+}
+void scaleWaves(const WaveRow<double>& row, std::complex<double>* const blocks[3], double* scratch) {
+    HWY_DYNAMIC_DISPATCH(scaleWavesD)(row, blocks, scratch);
+}
+const char* instructionSet() {
+    return HWY_DYNAMIC_DISPATCH(targetName)();
+}
+
+} // namespace PSE
+#endif

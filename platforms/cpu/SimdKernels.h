@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_SIMDKERNELS_H_
+#define OPENMMPSE_SIMDKERNELS_H_
+
+// The inner loops of the CPU platform, compiled for every instruction set that Highway knows and chosen at run time. They see
+// plain arrays only. Real is float or double.
+
+#include "numerics/Noise.h"
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+
+namespace PSE {
+
+/** Window weights are padded with zeros to this many grid points, so that a row of them is whole SIMD vectors. */
+inline int paddedSupport(int support) {
+    return support <= 4 ? 4 : (support <= 8 ? 8 : 16);
+}
+
+/** Particles on the grid, sorted by the cell of their first grid point. */
+template <class Real>
+struct GridParticles {
+    int support, padded;            ///< P, paddedSupport(P)
+    int size[3];                    ///< grid points M_d
+    size_t rowLength;               ///< reals from one row of the grid to the next; rows are padded by `padded` points
+    const int* columnStart;         ///< [M_x M_y + 1] first particle of each column (x, y) of cells
+    const int* first;               ///< [n][3] first grid point touched, in [0, M_d)
+    const Real* weights;            ///< [n][3][padded]
+    const Real* forces;             ///< [n][3]
+};
+
+/** One polynomial per point of the window: coefficients[degree][padded], highest power first. */
+template <class Real>
+struct WindowPolynomials {
+    int degree, padded;
+    const Real* coefficients;
+};
+
+/** Neighbours within range, as rows of a symmetric sparse matrix of 3x3 blocks F I + C d d^T. */
+template <class Real>
+struct PairRows {
+    struct Entry {
+        int32_t neighbour;
+        Real F, C, dx, dy, dz;
+    };
+    Real self;                      ///< diagonal blocks
+    const int64_t* start;           ///< [n] first entry of a row
+    const int32_t* count;           ///< [n] entries of a row
+    const Entry* entries;
+};
+
+/** Real-space scalars by polynomials in t = 2 r^2/rc^2 - 1 (RealTable), highest power first; lengths in radii. */
+template <class Real>
+struct PairPolynomials {
+    Real rc;
+    int degreeF, degreeC;
+    const Real *F, *C;
+};
+
+/** What turns forces into velocities for one column block [x][z] of modes at fixed y. */
+template <class Real>
+struct WaveRow {
+    int size[3];                    ///< grid points M_d
+    int ny;                         ///< signed wave index along y
+    size_t blockLength;             ///< complex numbers from one row of the block to the next
+    Real waveVectors[9];            ///< columns of k = waveVectors n, row-major, in 1/a
+    const Real* factors;            ///< [M_x][blockLength] wave factor over window^2, 0 for dropped modes
+    bool forced;
+    Real noise;                     ///< amplitude of the thermal part, 0 for none
+    numerics::NoiseKey key;
+};
+
+/** weights[particle][axis][point] from t[particle][axis], for n particles. */
+void evaluateWindows(const WindowPolynomials<float>& window, const float* t, int n, float* weights);
+void evaluateWindows(const WindowPolynomials<double>& window, const double* t, int n, double* weights);
+
+/** Add the forces of all particles that touch the plane x to the three planes [y][z]; row ends are folded back. */
+void spreadPlane(const GridParticles<float>& particles, int x, float* const planes[3]);
+void spreadPlane(const GridParticles<double>& particles, int x, double* const planes[3]);
+
+/** u[particle][3] for particles [from, to) from the three grids, whose row ends repeat their beginnings. */
+void gatherVelocities(const GridParticles<float>& particles, int from, int to, const float* const grids[3], float* u);
+void gatherVelocities(const GridParticles<double>& particles, int from, int to, const double* const grids[3], double* u);
+
+/** F and C of `count` entries whose dx, dy, dz are set. */
+void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries);
+void evaluatePairs(const PairPolynomials<double>& table, int count, PairRows<double>::Entry* entries);
+
+/** out[i] = M_R v for rows [from, to); v and out are [n][3]. */
+void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out);
+void multiplyRows(const PairRows<double>& rows, int from, int to, const double* v, double* out);
+
+/** u = (I - kk)(D f + noise sqrt(D) z), in place, for three blocks [x][z] of complex numbers. */
+void scaleWaves(const WaveRow<float>& row, std::complex<float>* const blocks[3], float* scratch);
+void scaleWaves(const WaveRow<double>& row, std::complex<double>* const blocks[3], double* scratch);
+/** Reals of scratch that scaleWaves() needs for nz/2 + 1 modes. */
+inline size_t waveScratch(size_t blockLength) {
+    return 6*blockLength;
+}
+
+/** Name of the instruction set in use. */
+const char* instructionSet();
+
+} // namespace PSE
+
+#endif

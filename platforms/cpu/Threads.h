@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_THREADS_H_
+#define OPENMMPSE_THREADS_H_
+
+#include "openmm/internal/ThreadPool.h"
+#include <atomic>
+
+namespace PSE {
+
+/**
+ * Runs independent tasks on OpenMM's threads. Whatever a task computes must not depend on the thread it runs on, nor on
+ * how many there are: then a step gives the same bits for any number of threads.
+ */
+class Threads {
+public:
+    /** @param serial  run in the calling thread: waking others costs more than a small scene */
+    Threads(OpenMM::ThreadPool& pool, bool serial) : pool(pool), serial(serial) {}
+    int count() const { return serial ? 1 : pool.getNumThreads(); }
+
+    /** Call work(task, thread) once for each task in [0, tasks); it must not throw. */
+    template <class Work>
+    void run(int tasks, Work work) const {
+        if (serial || tasks < 2) {
+            for (int task = 0; task < tasks; task++)
+                work(task, 0);
+            return;
+        }
+        std::atomic<int> next(0);
+        pool.execute([&](OpenMM::ThreadPool&, int thread) {
+            for (int task = next++; task < tasks; task = next++)
+                work(task, thread);
+        });
+        pool.waitForThreads();
+    }
+
+    /** Call work(from, to, block) for blocks of a fixed size that cover [0, n). */
+    template <class Work>
+    void runBlocks(int n, Work work) const {
+        run(blocks(n), [&](int block, int) { work(block*BLOCK, n < (block + 1)*BLOCK ? n : (block + 1)*BLOCK, block); });
+    }
+    static int blocks(int n) { return (n + BLOCK - 1)/BLOCK; }
+
+private:
+    static constexpr int BLOCK = 256;
+    OpenMM::ThreadPool& pool;
+    bool serial;
+};
+
+} // namespace PSE
+
+#endif

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_MOBILITYENGINE_H_
+#define OPENMMPSE_MOBILITYENGINE_H_
+
+#include "numerics/Noise.h"
+#include "numerics/Plan.h"
+#include "openmmpse/internal/Scene.h"
+#include <chrono>
+#include <memory>
+#include <vector>
+
+namespace PSE {
+
+/** The thermal part of a step: u += sqrt(2 kT/dt) M^{1/2} z [T1]. */
+struct Thermal {
+    double kT, dt;                   ///< kJ/mol, ps
+    numerics::NoiseKey real, wave;   ///< the noise of the two halves
+};
+
+/** Stage times, in the order in which the stages first ran. */
+class StageClock {
+public:
+    using Clock = std::chrono::steady_clock;
+    /** Charge the time since the last call (or start()) to a stage. */
+    void start() { last = Clock::now(); }
+    void charge(const char* stage);
+    const std::vector<StageTime>& times() const { return stages; }
+
+private:
+    Clock::time_point last;
+    std::vector<StageTime> stages;
+};
+
+/**
+ * The mobility of the mobile particles on one platform. Vectors have one entry per mobile particle, in units of
+ * OpenMM (nm, kJ/(mol nm), nm/ps).
+ */
+class MobilityEngine {
+public:
+    virtual ~MobilityEngine() = default;
+    /** Positions need not lie in the primary box. */
+    virtual void setPositions(const std::vector<numerics::Vec3>& x) = 0;
+    /**
+     * u = M f + sqrt(2 kT/dt) M^{1/2} z at the positions set last.
+     * @param forces   NULL: none
+     * @param thermal  NULL: no noise
+     */
+    virtual void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
+                                   std::vector<numerics::Vec3>& u) = 0;
+    /** Lanczos iterations of the last call with noise. */
+    virtual int lanczosIterations() const = 0;
+};
+
+/** What a platform supplies: how to plan, and the engine for a Plan. */
+class EngineFactory {
+public:
+    virtual ~EngineFactory() = default;
+    /** Fill in what the platform knows of the request: its precision and its costs. */
+    virtual void adapt(numerics::PlanRequest& request) const = 0;
+    /**
+     * @param indices  particle index in the System of each mobile particle: noise belongs to the particle
+     * @throws OpenMMException naming the memory needed and available, if the Plan does not fit
+     */
+    virtual std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+                                                   const std::vector<int>& indices, StageClock& clock) const = 0;
+};
+
+} // namespace PSE
+
+#endif

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+#include "ReferenceEngine.h"
+#include "numerics/Lanczos.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/reference/ReferenceNeighborList.h"
+#include <cmath>
+#include <deque>
+
+using namespace PSE::numerics;
+using std::complex;
+
+namespace PSE {
+
+/** The vector operations of lanczosSquareRoot(). */
+class ReferenceEngine::LanczosSpace {
+public:
+    using Vector = Vectors;
+    explicit LanczosSpace(const ReferenceEngine& engine) : engine(engine) {}
+    Vector& basis(int i) {
+        while (static_cast<int>(vectors.size()) <= i)
+            vectors.emplace_back(engine.positions.size());
+        return vectors[i];
+    }
+    void multiply(const Vector& v, Vector& out) const { engine.multiplyReal(v, out); }
+    double dot(const Vector& v, const Vector& w) const {
+        double sum = 0;
+        for (size_t i = 0; i < v.size(); i++)
+            sum += v[i].dot(w[i]);
+        return sum;
+    }
+    void scaledCopy(double s, const Vector& v, Vector& out) const {
+        for (size_t i = 0; i < v.size(); i++)
+            out[i] = s*v[i];
+    }
+    void addScaled(double s, const Vector& v, Vector& out) const {
+        for (size_t i = 0; i < v.size(); i++)
+            out[i] += s*v[i];
+    }
+
+private:
+    const ReferenceEngine& engine;
+    std::deque<Vector> vectors; // references to earlier vectors stay valid while it grows
+};
+
+ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double viscosity, const std::vector<int>& indices,
+                                 StageClock& clock)
+    : plan(plan), box(box), viscosity(viscosity), selfMobility(1/(6*M_PI*viscosity*plan.a)), indices(indices), clock(clock),
+      table(makeRealTable(*plan.split, plan.realCutoff/plan.a, plan.tableError)) {
+    listModes();
+}
+
+void ReferenceEngine::listModes() {
+    const Matrix3 waves = box.waveVectors();
+    const int limit[3] = {(plan.grid[0] - 1)/2, (plan.grid[1] - 1)/2, (plan.grid[2] - 1)/2}; // Nyquist planes are dropped
+    for (int n1 = -limit[0]; n1 <= limit[0]; n1++)
+        for (int n2 = -limit[1]; n2 <= limit[1]; n2++)
+            for (int n3 = 0; n3 <= limit[2]; n3++) {
+                if (!isCanonicalMode(n1, n2, n3))
+                    continue;
+                const Vec3 k = waves*Vec3(n1, n2, n3);
+                const double weight = plan.split->waveWeight(k.norm()*plan.a);
+                if (weight > 0)
+                    modes.push_back({{n1, n2, n3}, k.normalized(), weight/(viscosity*box.volume()*k.squaredNorm())});
+            }
+}
+
+void ReferenceEngine::setPositions(const std::vector<Vec3>& x) {
+    clock.start();
+    positions.resize(x.size());
+    for (size_t i = 0; i < x.size(); i++)
+        positions[i] = box.wrapped(x[i]);
+    pairs.clear();
+    if (plan.sumImages)
+        listImages();
+    else
+        listNeighbours();
+    preparePhases();
+    clock.charge("neighbour list");
+}
+
+void ReferenceEngine::addPair(int i, int j, const Vec3& d) {
+    const Vec3 reduced = d/plan.a;
+    const double r = reduced.norm();
+    if (r >= table.rc)
+        return;
+    const SmoothScalars s = table(r);
+    pairs.push_back({i, j, reduced, s.F, s.C});
+}
+
+void ReferenceEngine::listNeighbours() {
+    OpenMM::AtomLocationList locations;
+    for (const Vec3& x : positions)
+        locations.push_back(OpenMM::Vec3(x[0], x[1], x[2]));
+    OpenMM::Vec3 vectors[3];
+    for (int d = 0; d < 3; d++)
+        vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
+    OpenMM::NeighborList list;
+    const int n = static_cast<int>(positions.size());
+    const double margin = 1e-9*plan.realCutoff; // the list's own rounding must not lose a pair
+    computeNeighborListVoxelHash(list, n, locations, std::vector<std::set<int>>(n), vectors, true, plan.realCutoff + margin);
+    for (const auto& pair : list) {
+        const int i = static_cast<int>(std::min(pair.first, pair.second)), j = static_cast<int>(std::max(pair.first, pair.second));
+        addPair(i, j, box.minimumImage(positions[i] - positions[j]));
+    }
+    // The order of the list must not show in the last bits: a restart rebuilds it from the same positions.
+    std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.i < q.i || (p.i == q.i && p.j < q.j); });
+}
+
+void ReferenceEngine::listImages() {
+    const std::vector<Vec3> images = box.imagesWithin(plan.realCutoff);
+    const int n = static_cast<int>(positions.size());
+    for (int i = 0; i < n; i++)
+        for (int j = i; j < n; j++)
+            for (const Vec3& image : images)
+                if (i != j || image != Vec3::Zero())
+                    addPair(i, j, positions[i] - positions[j] + image);
+}
+
+void ReferenceEngine::preparePhases() {
+    for (int d = 0; d < 3; d++) {
+        const int reach = plan.grid[d]/2;
+        phases[d].resize(positions.size()*(2*reach + 1));
+        for (size_t i = 0; i < positions.size(); i++) {
+            const double angle = 2*M_PI*box.fractional(positions[i])[d];
+            for (int n = -reach; n <= reach; n++)
+                phases[d][i*(2*reach + 1) + reach + n] = std::polar(1.0, n*angle);
+        }
+    }
+}
+
+complex<double> ReferenceEngine::phase(int particle, const Mode& mode) const {
+    complex<double> product = 1;
+    for (int d = 0; d < 3; d++) {
+        const int reach = plan.grid[d]/2;
+        product *= phases[d][particle*(2*reach + 1) + reach + mode.n[d]];
+    }
+    return product;
+}
+
+void ReferenceEngine::multiplyReal(const Vectors& v, Vectors& out) const {
+    for (size_t i = 0; i < v.size(); i++)
+        out[i] = table.self*v[i];
+    for (const Pair& p : pairs) {
+        out[p.i] += p.F*v[p.j] + p.C*p.d.dot(v[p.j])*p.d;
+        // An image of the particle itself is listed with its opposite: once is enough.
+        if (p.i != p.j)
+            out[p.j] += p.F*v[p.i] + p.C*p.d.dot(v[p.i])*p.d;
+    }
+}
+
+void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vectors& u) {
+    Vectors part(u.size());
+    if (forces != NULL) {
+        multiplyReal(*forces, part);
+        for (size_t i = 0; i < u.size(); i++)
+            u[i] += selfMobility*part[i];
+    }
+    if (thermal != NULL) {
+        Vectors z(u.size());
+        for (size_t i = 0; i < u.size(); i++)
+            particleNoise(thermal->real, indices[i], z[i].data());
+        LanczosSpace space(*this);
+        // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
+        iterations = lanczosSquareRoot(space, z, part, LANCZOS_TOLERANCE, std::max(2*plan.predictedError, 1e-10), true);
+        const double scale = std::sqrt(2*thermal->kT*selfMobility/thermal->dt);
+        for (size_t i = 0; i < u.size(); i++)
+            u[i] += scale*part[i];
+    }
+}
+
+void ReferenceEngine::addWaves(const Vectors* forces, const Thermal* thermal, Vectors& u) const {
+    const int n = static_cast<int>(u.size());
+    std::vector<complex<double>> e(n);
+    for (const Mode& mode : modes) {
+        Eigen::Vector3cd wave = Eigen::Vector3cd::Zero();
+        for (int i = 0; i < n; i++) {
+            e[i] = phase(i, mode);
+            if (forces != NULL)
+                wave += mode.B*std::conj(e[i])*(*forces)[i];
+        }
+        if (thermal != NULL) {
+            complex<double> z[3];
+            modeNoise(thermal->wave, mode.n[0], mode.n[1], mode.n[2], z);
+            wave += std::sqrt(2*thermal->kT*mode.B/thermal->dt)*Eigen::Vector3cd(z[0], z[1], z[2]);
+        }
+        wave -= mode.direction*(mode.direction.cast<complex<double>>().dot(wave));
+        for (int i = 0; i < n; i++) // the mode and its conjugate
+            u[i] += 2*(e[i]*wave).real();
+    }
+}
+
+void ReferenceEngine::computeVelocities(const Vectors* forces, const Thermal* thermal, Vectors& u) {
+    u.assign(positions.size(), Vec3::Zero());
+    clock.start();
+    addReal(forces, thermal, u);
+    clock.charge("real space");
+    addWaves(forces, thermal, u);
+    clock.charge("wave space");
+}
+
+} // namespace PSE
