@@ -73,18 +73,22 @@ inline bool isCanonicalMode(int n1, int n2, int n3) {
     return n3 > 0 || (n3 == 0 && (n1 > 0 || (n1 == 0 && n2 > 0)));
 }
 
+/** The 64-bit index of a mode, the same for n and -n: 21 bits of two's complement for each canonical component. */
+inline uint64_t modeIndex(int n1, int n2, int n3) {
+    const int sign = isCanonicalMode(n1, n2, n3) ? 1 : -1;
+    const auto packed = [sign](int n) { return uint64_t(sign*n) & 0x1FFFFFu; };
+    return packed(n1) | packed(n2) << 21 | packed(n3) << 42;
+}
+
 /**
  * Three complex normal numbers for a mode n, E[z z*] = 1 each (real and imaginary part of variance 1/2), and
  * z(-n) = z(n)* exactly.
  */
 template <class Real>
 inline void modeNoise(const NoiseKey& key, int n1, int n2, int n3, std::complex<Real> z[3]) {
-    const bool canonical = isCanonicalMode(n1, n2, n3);
-    const int sign = canonical ? 1 : -1;
-    const auto packed = [sign](int n) { return uint64_t(sign*n) & 0x1FFFFFu; }; // 21 bits, two's complement
+    const Real half = Real(M_SQRT1_2), sign = Real(isCanonicalMode(n1, n2, n3) ? 1 : -1);
     Real g[8];
-    normals(key, packed(n1) | packed(n2) << 21 | packed(n3) << 42, g);
-    const Real half = Real(M_SQRT1_2);
+    normals(key, modeIndex(n1, n2, n3), g);
     for (int c = 0; c < 3; c++)
         z[c] = std::complex<Real>(half*g[2*c], sign*half*g[2*c + 1]);
 }

@@ -190,9 +190,17 @@ Plan makePlan(const PlanRequest& request) {
         const double longest = std::max({request.box.length(0), request.box.length(1), request.box.length(2)});
         // From a range of about the whole box (few particles in a large box) to one below contact.
         const double first = std::min(0.03, 6*request.radius/longest), last = 2.0, factor = 1.12;
+        // A prescribed grid serves only some xi: the cheapest of those, else the one with the smallest error.
+        const bool gridGiven = (request.overrides.grid[0] > 0);
         double lowest = std::numeric_limits<double>::infinity();
         for (double xi = first; xi < last; xi *= factor) {
-            const Plan plan = planner.at(xi, cost);
+            Plan plan = planner.at(xi, cost);
+            if (gridGiven) {
+                checkPlan(plan);
+                planner.finish(plan);
+                if (plan.predictedError > request.tolerance)
+                    cost = plan.predictedError*1e100;
+            }
             if (cost < lowest) {
                 lowest = cost;
                 best = plan;

@@ -17,15 +17,12 @@ struct PairScalars {
  */
 template <class Real>
 inline void rpyScalars(Real r, Real& F, Real& G) {
-    if (r >= 2) {
-        const Real s = 1/r;
-        F = s*(Real(0.75) + Real(0.5)*s*s);
-        G = s*(Real(1.5) - s*s);
-    }
-    else {
-        F = 1 - Real(9.0/32)*r;
-        G = 1 - Real(3.0/16)*r;
-    }
+    // Both regimes, then a choice: loops over many r stay SIMD. At r = 0 the unused one is infinite.
+    const Real s = 1/r;
+    const Real apartF = s*(Real(0.75) + Real(0.5)*s*s), apartG = s*(Real(1.5) - s*s);
+    const Real overlapF = 1 - Real(9.0/32)*r, overlapG = 1 - Real(3.0/16)*r;
+    F = (r >= 2 ? apartF : overlapF);
+    G = (r >= 2 ? apartG : overlapG);
 }
 
 inline PairScalars rpyScalars(double r) {

@@ -46,9 +46,14 @@ bool CpuRealSpace<Real>::listIsValid(const std::vector<Vec3>& x) const {
 template <class Real>
 void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& x) {
     positions.resize(x.size());
+    for (std::vector<double>& axis : axes)
+        axis.resize(x.size());
     threads.runBlocks(static_cast<int>(x.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
+        for (int i = from; i < to; i++) {
             positions[i] = box.wrapped(x[i]);
+            for (int d = 0; d < 3; d++)
+                axes[d][i] = positions[i][d];
+        }
     });
     count.resize(x.size());
     if (sumImages)
@@ -101,46 +106,39 @@ void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
     });
 }
 
-/** @return whether the pair is in range and was written */
 template <class Real>
-bool CpuRealSpace<Real>::addEntry(int j, const Vec3& d, Entry* entry) const {
-    if (d.squaredNorm() >= range*range)
-        return false;
-    const Vec3 reduced = d/a;
-    *entry = {j, 0, 0, Real(reduced[0]), Real(reduced[1]), Real(reduced[2])};
-    return true;
+PairPolynomials<Real> CpuRealSpace<Real>::polynomials() const {
+    return {Real(range/a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1, coefficientsF.data(),
+            coefficientsC.data()};
 }
 
 template <class Real>
 void CpuRealSpace<Real>::fillRows() {
-    const PairPolynomials<Real> table = {Real(range/a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1,
-                                         coefficientsF.data(), coefficientsC.data()};
+    const PairPolynomials<Real> table = polynomials();
+    const Matrix3& v = box.vectors();
+    const PairGeometry geometry = {axes[0].data(), axes[1].data(), axes[2].data(),
+                                   {v(0, 0), v(0, 1), v(1, 1), v(0, 2), v(1, 2), v(2, 2)}, range, a};
     threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++) {
-            Entry* row = entries.data() + start[i];
-            int found = 0;
-            for (int64_t k = start[i]; k < start[i + 1]; k++)
-                found += addEntry(candidates[k], box.minimumImage(positions[i] - positions[candidates[k]]), row + found);
-            count[i] = found;
-            evaluatePairs(table, found, row);
-        }
+        for (int i = from; i < to; i++)
+            count[i] = fillRow(geometry, table, i, candidates.data() + start[i], int(start[i + 1] - start[i]),
+                               entries.data() + start[i]);
     });
 }
 
 /** For ranges beyond half the box: every image of every pair. Few particles, or a range never chosen automatically. */
 template <class Real>
 void CpuRealSpace<Real>::fillRowsWithImages() {
-    const PairPolynomials<Real> table = {Real(range/a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1,
-                                         coefficientsF.data(), coefficientsC.data()};
+    const PairPolynomials<Real> table = polynomials();
     const std::vector<Vec3> images = box.imagesWithin(range);
     const int n = static_cast<int>(positions.size());
     std::vector<std::vector<Entry>> found(n);
     threads.run(n, [&](int i, int) {
-        Entry entry;
         for (int j = 0; j < n; j++)
-            for (const Vec3& image : images)
-                if ((i != j || image != Vec3::Zero()) && addEntry(j, positions[i] - positions[j] + image, &entry))
-                    found[i].push_back(entry);
+            for (const Vec3& image : images) {
+                const Vec3 d = positions[i] - positions[j] + image;
+                if (d.squaredNorm() < range*range && (i != j || image != Vec3::Zero()))
+                    found[i].push_back({j, 0, 0, Real(d[0]/a), Real(d[1]/a), Real(d[2]/a)});
+            }
         evaluatePairs(table, static_cast<int>(found[i].size()), found[i].data());
     });
     start.assign(n + 1, 0);

@@ -41,7 +41,7 @@ private:
     void buildList(const std::vector<numerics::Vec3>& x);
     void fillRows();
     void fillRowsWithImages();
-    bool addEntry(int j, const numerics::Vec3& d, Entry* entry) const;
+    PairPolynomials<Real> polynomials() const;
     PairRows<Real> rows() const;
 
     numerics::Lattice box;
@@ -55,6 +55,7 @@ private:
     OpenMM::AlignedArray<float> listPositions;
     std::vector<std::set<int>> noExclusions;
     std::vector<numerics::Vec3> positions;   ///< in the primary box
+    std::vector<double> axes[3];             ///< the same, one array per coordinate
     std::vector<numerics::Vec3> atBuild;     ///< as given when the list was built
     std::vector<int32_t> candidates;         ///< neighbours within range + skin, row by row
     std::vector<int64_t> start;              ///< [n + 1]

@@ -7,6 +7,7 @@
 #define HWY_TARGET_INCLUDE "SimdKernels.cpp"
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
+#include <hwy/contrib/math/math-inl.h>
 
 // Plain loops over padded rows: inside these namespaces the compiler may use the instruction set in question, and does.
 HWY_BEFORE_NAMESPACE();
@@ -130,20 +131,104 @@ HWY_INLINE void gatherAny(const GridParticles<Real>& p, int from, int to, const 
         gatherPadded<16>(p, from, to, grids, u);
 }
 
+constexpr int CHUNK = 16; ///< pairs worked on at once: loops of this fixed length are whole SIMD vectors
+
+/** CHUNK pairs, one array per quantity. */
+template <class Real>
+struct PairChunk {
+    Real dx[CHUNK], dy[CHUNK], dz[CHUNK], F[CHUNK], C[CHUNK];
+};
+
+/** F and C of all CHUNK pairs; unused ones hold any finite displacement. */
+template <class Real>
+HWY_INLINE void evaluateChunk(const PairPolynomials<Real>& table, PairChunk<Real>& p) {
+    const Real scale = 2/(table.rc*table.rc);
+    Real r2[CHUNK], t[CHUNK], waveF[CHUNK], waveC[CHUNK];
+    for (int i = 0; i < CHUNK; i++) {
+        r2[i] = p.dx[i]*p.dx[i] + p.dy[i]*p.dy[i] + p.dz[i]*p.dz[i];
+        t[i] = scale*r2[i] - 1;
+        waveF[i] = table.F[0];
+        waveC[i] = table.C[0];
+    }
+    for (int power = 1; power <= table.degreeF; power++)
+        for (int i = 0; i < CHUNK; i++)
+            waveF[i] = waveF[i]*t[i] + table.F[power];
+    for (int power = 1; power <= table.degreeC; power++)
+        for (int i = 0; i < CHUNK; i++)
+            waveC[i] = waveC[i]*t[i] + table.C[power];
+    for (int i = 0; i < CHUNK; i++) {
+        Real F, G;
+        numerics::rpyScalars(std::sqrt(r2[i]), F, G);
+        const Real C = (G - F)/r2[i];
+        p.F[i] = F - waveF[i];
+        p.C[i] = (r2[i] > 0 ? C : 0) - waveC[i]; // r r^T vanishes at r = 0
+    }
+}
+
+/** Nearest images of x_i - x_j for n <= CHUNK candidates, the last one repeated in the unused places. */
+HWY_INLINE void displaceChunk(const PairGeometry& g, int i, const int32_t* HWY_RESTRICT candidates, int n,
+                              double* HWY_RESTRICT dx, double* HWY_RESTRICT dy, double* HWY_RESTRICT dz) {
+    const double inverseX = 1/g.box[0], inverseY = 1/g.box[2], inverseZ = 1/g.box[5];
+    for (int k = 0; k < CHUNK; k++) {
+        const int32_t j = candidates[k < n ? k : n - 1];
+        dx[k] = g.x[i] - g.x[j];
+        dy[k] = g.y[i] - g.y[j];
+        dz[k] = g.z[i] - g.z[j];
+    }
+    for (int k = 0; k < CHUNK; k++) {
+        const double nc = std::floor(dz[k]*inverseZ + 0.5);
+        dx[k] -= nc*g.box[3];
+        dy[k] -= nc*g.box[4];
+        dz[k] -= nc*g.box[5];
+        const double nb = std::floor(dy[k]*inverseY + 0.5);
+        dx[k] -= nb*g.box[1];
+        dy[k] -= nb*g.box[2];
+        dx[k] -= std::floor(dx[k]*inverseX + 0.5)*g.box[0];
+    }
+}
+
+template <class Real>
+HWY_INLINE int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
+                          typename PairRows<Real>::Entry* row) {
+    const double range2 = g.range*g.range, scale = 1/g.radius;
+    double dx[CHUNK], dy[CHUNK], dz[CHUNK], r2[CHUNK];
+    PairChunk<Real> chunk;
+    int found = 0;
+    for (int begin = 0; begin < n; begin += CHUNK) {
+        const int inChunk = (n - begin < CHUNK ? n - begin : CHUNK);
+        displaceChunk(g, i, candidates + begin, inChunk, dx, dy, dz);
+        for (int k = 0; k < CHUNK; k++) {
+            r2[k] = dx[k]*dx[k] + dy[k]*dy[k] + dz[k]*dz[k];
+            chunk.dx[k] = Real(dx[k]*scale);
+            chunk.dy[k] = Real(dy[k]*scale);
+            chunk.dz[k] = Real(dz[k]*scale);
+        }
+        evaluateChunk(table, chunk);
+        for (int k = 0; k < inChunk; k++) { // no branch: an entry out of range is overwritten by the next
+            row[found] = {candidates[begin + k], chunk.F[k], chunk.C[k], chunk.dx[k], chunk.dy[k], chunk.dz[k]};
+            found += (r2[k] < range2);
+        }
+    }
+    return found;
+}
+
 template <class Real>
 HWY_INLINE void evaluatePairsAny(const PairPolynomials<Real>& table, int count, typename PairRows<Real>::Entry* entries) {
-    for (int i = 0; i < count; i++) {
-        auto& e = entries[i];
-        const Real r2 = e.dx*e.dx + e.dy*e.dy + e.dz*e.dz;
-        const Real t = 2*r2/(table.rc*table.rc) - 1, r = std::sqrt(r2);
-        Real waveF = table.F[0], waveC = table.C[0], F, G;
-        for (int power = 1; power <= table.degreeF; power++)
-            waveF = waveF*t + table.F[power];
-        for (int power = 1; power <= table.degreeC; power++)
-            waveC = waveC*t + table.C[power];
-        numerics::rpyScalars(r, F, G);
-        e.F = F - waveF;
-        e.C = (r2 > 0 ? (G - F)/r2 : 0) - waveC;
+    PairChunk<Real> chunk;
+    for (int begin = 0; begin < count; begin += CHUNK) {
+        auto* e = entries + begin;
+        const int n = (count - begin < CHUNK ? count - begin : CHUNK);
+        for (int k = 0; k < CHUNK; k++) {
+            const auto& from = e[k < n ? k : n - 1];
+            chunk.dx[k] = from.dx;
+            chunk.dy[k] = from.dy;
+            chunk.dz[k] = from.dz;
+        }
+        evaluateChunk(table, chunk);
+        for (int k = 0; k < n; k++) {
+            e[k].F = chunk.F[k];
+            e[k].C = chunk.C[k];
+        }
     }
 }
 
@@ -167,18 +252,79 @@ HWY_INLINE void multiplyRowsAny(const PairRows<Real>& rows, int from, int to, co
     }
 }
 
-/** noise[6][blockLength]: real and imaginary parts of the three components, for kept modes. */
-template <class Real>
-HWY_INLINE void fillModeNoise(const WaveRow<Real>& row, int nx, const Real* factors, Real* noise) {
-    for (int nz = 0; nz <= row.size[2]/2; nz++) {
-        if (factors[nz] == 0)
-            continue;
-        std::complex<Real> z[3];
-        numerics::modeNoise(row.key, nx, row.ny, nz, z);
-        for (int c = 0; c < 3; c++) {
-            noise[2*c*row.blockLength + nz] = z[c].real();
-            noise[(2*c + 1)*row.blockLength + nz] = z[c].imag();
+/** philox() of Noise.h for a row of indices that differ in their upper word, one loop that the compiler vectorises. */
+HWY_INLINE void philoxRow(const numerics::NoiseKey& key, uint32_t part, uint32_t low, const uint32_t* HWY_RESTRICT high, int n,
+                          uint32_t* HWY_RESTRICT w0, uint32_t* HWY_RESTRICT w1, uint32_t* HWY_RESTRICT w2,
+                          uint32_t* HWY_RESTRICT w3) {
+    const uint32_t step = uint32_t(key.counter), last = (uint32_t(key.counter >> 32) & 0xFFFFu) | (part << 16);
+    const uint32_t seed = key.seed, stream = uint32_t(key.stream);
+    for (int i = 0; i < n; i++) {
+        uint32_t c0 = low, c1 = high[i], c2 = step, c3 = last, k0 = seed, k1 = stream;
+#pragma GCC unroll 10
+        for (int round = 0; round < 10; round++) {
+            const uint64_t p0 = uint64_t(0xD2511F53u)*c0, p1 = uint64_t(0xCD9E8D57u)*c2;
+            c0 = uint32_t(p1 >> 32) ^ c1 ^ k0;
+            c1 = uint32_t(p1);
+            c2 = uint32_t(p0 >> 32) ^ c3 ^ k1;
+            c3 = uint32_t(p0);
+            k0 += 0x9E3779B9u;
+            k1 += 0xBB67AE85u;
         }
+        w0[i] = c0;
+        w1[i] = c1;
+        w2[i] = c2;
+        w3[i] = c3;
+    }
+}
+
+/** boxMuller() of Noise.h for n pairs of words, n a multiple of the vector length; each number times `scale`. */
+template <class Real>
+HWY_INLINE void boxMullerRow(const uint32_t* HWY_RESTRICT first, const uint32_t* HWY_RESTRICT second, int n, Real scale,
+                             Real* HWY_RESTRICT z0, Real* HWY_RESTRICT z1) {
+    namespace hn = hwy::HWY_NAMESPACE;
+    const hn::ScalableTag<Real> d;
+    for (int i = 0; i < n; i++) {
+        z0[i] = (Real(first[i]) + Real(0.5))*Real(1.0/4294967296.0);
+        z1[i] = Real(int32_t(second[i]))*Real(M_PI/2147483648.0);
+    }
+    for (size_t i = 0; i < size_t(n); i += hn::Lanes(d)) {
+        const auto logarithm = hn::Min(hn::Log(d, hn::LoadU(d, z0 + i)), hn::Zero(d));
+        const auto radius = hn::Mul(hn::Set(d, scale), hn::Sqrt(hn::Mul(hn::Set(d, Real(-2)), logarithm)));
+        const auto angle = hn::LoadU(d, z1 + i);
+        hn::StoreU(hn::Mul(radius, hn::Cos(d, angle)), d, z0 + i);
+        hn::StoreU(hn::Mul(radius, hn::Sin(d, angle)), d, z1 + i);
+    }
+}
+
+/**
+ * modeNoise() of Noise.h for a row of modes n3 = 0, 1, ..., count - 1.
+ *
+ * noise  [6][blockLength]: real and imaginary part of each component
+ */
+template <class Real>
+HWY_INLINE void fillModeNoise(const WaveRow<Real>& row, int nx, int count, Real* HWY_RESTRICT noise) {
+    constexpr int BATCH = 64; // a multiple of every vector length
+    uint32_t high[BATCH], words[8][BATCH];
+    const Real half = Real(M_SQRT1_2);
+    for (int begin = 0; begin < count; begin += BATCH) {
+        // Beyond `count` the row is padding, at least up to a multiple of 16: noise there is never used.
+        const int n = (count - begin >= BATCH ? BATCH : (count - begin + 15)/16*16);
+        const uint64_t base = numerics::modeIndex(nx, row.ny, begin > 0 ? begin : 1);
+        for (int i = 0; i < n; i++)
+            high[i] = uint32_t(base >> 32) + (uint32_t(begin > 0 ? i : i - 1) << 10);
+        for (uint32_t part = 0; part < 2; part++)
+            philoxRow(row.key, part, uint32_t(base), high, n, words[4*part], words[4*part + 1], words[4*part + 2],
+                      words[4*part + 3]);
+        for (int c = 0; c < 3; c++)
+            boxMullerRow(words[2*c], words[2*c + 1], n, half, noise + 2*c*row.blockLength + begin,
+                         noise + (2*c + 1)*row.blockLength + begin);
+    }
+    // In the plane n3 = 0, n and -n are both stored and must be conjugate: the shared routine takes care of it.
+    std::complex<Real> z[3];
+    numerics::modeNoise(row.key, nx, row.ny, 0, z);
+    for (int c = 0; c < 3; c++) {
+        noise[2*c*row.blockLength] = z[c].real();
+        noise[(2*c + 1)*row.blockLength] = z[c].imag();
     }
 }
 
@@ -191,7 +337,7 @@ HWY_INLINE void scaleWavesAny(const WaveRow<Real>& row, std::complex<Real>* cons
         const int nx = (2*x <= row.size[0] ? x : x - row.size[0]);
         const Real* factors = row.factors + x*row.blockLength;
         if (row.noise != 0)
-            fillModeNoise(row, nx, factors, scratch);
+            fillModeNoise(row, nx, row.size[2]/2 + 1, scratch);
         Real* wave[3];
         for (int c = 0; c < 3; c++)
             wave[c] = reinterpret_cast<Real*>(blocks[c] + x*row.blockLength);
@@ -228,6 +374,12 @@ void spreadPlaneF(const GridParticles<float>& p, int x, float* const planes[3]) 
 void spreadPlaneD(const GridParticles<double>& p, int x, double* const planes[3]) { spreadPlaneAny(p, x, planes); }
 void gatherF(const GridParticles<float>& p, int from, int to, const float* const g[3], float* u) { gatherAny(p, from, to, g, u); }
 void gatherD(const GridParticles<double>& p, int from, int to, const double* const g[3], double* u) { gatherAny(p, from, to, g, u); }
+int fillRowF(const PairGeometry& g, const PairPolynomials<float>& t, int i, const int32_t* c, int n, PairRows<float>::Entry* r) {
+    return fillRowAny(g, t, i, c, n, r);
+}
+int fillRowD(const PairGeometry& g, const PairPolynomials<double>& t, int i, const int32_t* c, int n, PairRows<double>::Entry* r) {
+    return fillRowAny(g, t, i, c, n, r);
+}
 void evaluatePairsF(const PairPolynomials<float>& t, int n, PairRows<float>::Entry* e) { evaluatePairsAny(t, n, e); }
 void evaluatePairsD(const PairPolynomials<double>& t, int n, PairRows<double>::Entry* e) { evaluatePairsAny(t, n, e); }
 void multiplyRowsF(const PairRows<float>& r, int from, int to, const float* v, float* out) { multiplyRowsAny(r, from, to, v, out); }
@@ -249,6 +401,8 @@ HWY_EXPORT(spreadPlaneF);
 HWY_EXPORT(spreadPlaneD);
 HWY_EXPORT(gatherF);
 HWY_EXPORT(gatherD);
+HWY_EXPORT(fillRowF);
+HWY_EXPORT(fillRowD);
 HWY_EXPORT(evaluatePairsF);
 HWY_EXPORT(evaluatePairsD);
 HWY_EXPORT(multiplyRowsF);
@@ -274,6 +428,14 @@ void gatherVelocities(const GridParticles<float>& p, int from, int to, const flo
 }
 void gatherVelocities(const GridParticles<double>& p, int from, int to, const double* const grids[3], double* u) {
     HWY_DYNAMIC_DISPATCH(gatherD)(p, from, to, grids, u);
+}
+int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
+            PairRows<float>::Entry* row) {
+    return HWY_DYNAMIC_DISPATCH(fillRowF)(geometry, table, i, candidates, n, row);
+}
+int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
+            PairRows<double>::Entry* row) {
+    return HWY_DYNAMIC_DISPATCH(fillRowD)(geometry, table, i, candidates, n, row);
 }
 void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries) {
     HWY_DYNAMIC_DISPATCH(evaluatePairsF)(table, count, entries);

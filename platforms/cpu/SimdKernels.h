@@ -57,6 +57,13 @@ struct PairPolynomials {
     const Real *F, *C;
 };
 
+/** Positions in the primary box and the box in reduced form, in nm. */
+struct PairGeometry {
+    const double *x, *y, *z;
+    double box[6];                  ///< ax, bx, by, cx, cy, cz
+    double range, radius;
+};
+
 /** What turns forces into velocities for one column block [x][z] of modes at fixed y. */
 template <class Real>
 struct WaveRow {
@@ -82,6 +89,15 @@ void spreadPlane(const GridParticles<double>& particles, int x, double* const pl
 void gatherVelocities(const GridParticles<float>& particles, int from, int to, const float* const grids[3], float* u);
 void gatherVelocities(const GridParticles<double>& particles, int from, int to, const double* const grids[3], double* u);
 
+/**
+ * Write the entries of particle i for those of n candidate neighbours whose nearest image lies within the range, in their order.
+ * @return number of entries
+ */
+int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
+            PairRows<float>::Entry* row);
+int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
+            PairRows<double>::Entry* row);
+
 /** F and C of `count` entries whose dx, dy, dz are set. */
 void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries);
 void evaluatePairs(const PairPolynomials<double>& table, int count, PairRows<double>::Entry* entries);
@@ -93,7 +109,7 @@ void multiplyRows(const PairRows<double>& rows, int from, int to, const double* 
 /** u = (I - kk)(D f + noise sqrt(D) z), in place, for three blocks [x][z] of complex numbers. */
 void scaleWaves(const WaveRow<float>& row, std::complex<float>* const blocks[3], float* scratch);
 void scaleWaves(const WaveRow<double>& row, std::complex<double>* const blocks[3], double* scratch);
-/** Reals of scratch that scaleWaves() needs for nz/2 + 1 modes. */
+/** Reals of scratch that scaleWaves() needs: real and imaginary parts of three components, for a row of modes. */
 inline size_t waveScratch(size_t blockLength) {
     return 6*blockLength;
 }
