@@ -55,7 +55,7 @@ void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& x) {
                 axes[d][i] = positions[i][d];
         }
     });
-    count.resize(x.size());
+    blockCount.resize(x.size());
     if (sumImages)
         fillRowsWithImages();
     else {
@@ -82,7 +82,7 @@ void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
     list.computeNeighborList(n, listPositions, noExclusions, vectors, true, float(range + skin), pool);
 
     // From pairs in blocks, each once, to complete rows: count, then fill, then sort each row.
-    start.assign(n + 1, 0);
+    candidateStart.assign(n + 1, 0);
     const auto forEachPair = [&](auto work) {
         const std::vector<int32_t>& sorted = list.getSortedAtoms();
         for (int block = 0; block < list.getNumBlocks(); block++) {
@@ -93,16 +93,19 @@ void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
                         work(sorted[LIST_BLOCK*block + k], neighbours.getNeighbor());
         }
     };
-    forEachPair([&](int i, int j) { start[i + 1]++, start[j + 1]++; });
-    for (int i = 0; i < n; i++)
-        start[i + 1] += start[i];
-    candidates.resize(start[n]);
-    entries.resize(start[n]);
-    std::vector<int64_t> next(start.begin(), start.end() - 1);
+    forEachPair([&](int i, int j) { candidateStart[i + 1]++, candidateStart[j + 1]++; });
+    blockStart.assign(n + 1, 0);
+    for (int i = 0; i < n; i++) {
+        blockStart[i + 1] = blockStart[i] + (candidateStart[i + 1] + PAIR_LANES - 1)/PAIR_LANES;
+        candidateStart[i + 1] += candidateStart[i];
+    }
+    candidates.resize(candidateStart[n]);
+    blocks.resize(blockStart[n]);
+    std::vector<int64_t> next(candidateStart.begin(), candidateStart.end() - 1);
     forEachPair([&](int i, int j) { candidates[next[i]++] = j, candidates[next[j]++] = i; });
     threads.runBlocks(n, [&](int from, int to, int) {
         for (int i = from; i < to; i++)
-            std::sort(candidates.begin() + start[i], candidates.begin() + start[i + 1]);
+            std::sort(candidates.begin() + candidateStart[i], candidates.begin() + candidateStart[i + 1]);
     });
 }
 
@@ -120,8 +123,8 @@ void CpuRealSpace<Real>::fillRows() {
                                    {v(0, 0), v(0, 1), v(1, 1), v(0, 2), v(1, 2), v(2, 2)}, range, a};
     threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
         for (int i = from; i < to; i++)
-            count[i] = fillRow(geometry, table, i, candidates.data() + start[i], int(start[i + 1] - start[i]),
-                               entries.data() + start[i]);
+            blockCount[i] = fillRow(geometry, table, i, candidates.data() + candidateStart[i],
+                                    int(candidateStart[i + 1] - candidateStart[i]), blocks.data() + blockStart[i]);
     });
 }
 
@@ -131,28 +134,38 @@ void CpuRealSpace<Real>::fillRowsWithImages() {
     const PairPolynomials<Real> table = polynomials();
     const std::vector<Vec3> images = box.imagesWithin(range);
     const int n = static_cast<int>(positions.size());
-    std::vector<std::vector<Entry>> found(n);
+    std::vector<std::vector<PairBlock<Real>>> found(n);
     threads.run(n, [&](int i, int) {
+        int used = PAIR_LANES;
         for (int j = 0; j < n; j++)
             for (const Vec3& image : images) {
                 const Vec3 d = positions[i] - positions[j] + image;
-                if (d.squaredNorm() < range*range && (i != j || image != Vec3::Zero()))
-                    found[i].push_back({j, 0, 0, Real(d[0]/a), Real(d[1]/a), Real(d[2]/a)});
+                if (d.squaredNorm() >= range*range || (i == j && image == Vec3::Zero()))
+                    continue;
+                if (used == PAIR_LANES) {
+                    found[i].push_back({});
+                    used = 0;
+                }
+                PairBlock<Real>& block = found[i].back();
+                block.neighbour[used] = j;
+                block.dx[used] = Real(d[0]/a);
+                block.dy[used] = Real(d[1]/a);
+                block.dz[used++] = Real(d[2]/a);
             }
-        evaluatePairs(table, static_cast<int>(found[i].size()), found[i].data());
+        evaluateBlocks(table, static_cast<int>(found[i].size()), used, found[i].data());
     });
-    start.assign(n + 1, 0);
-    entries.clear();
+    blockStart.assign(n + 1, 0);
+    blocks.clear();
     for (int i = 0; i < n; i++) {
-        count[i] = static_cast<int32_t>(found[i].size());
-        start[i + 1] = start[i] + count[i];
-        entries.insert(entries.end(), found[i].begin(), found[i].end());
+        blockCount[i] = static_cast<int32_t>(found[i].size());
+        blockStart[i + 1] = blockStart[i] + blockCount[i];
+        blocks.insert(blocks.end(), found[i].begin(), found[i].end());
     }
 }
 
 template <class Real>
 PairRows<Real> CpuRealSpace<Real>::rows() const {
-    return {self, start.data(), count.data(), entries.data()};
+    return {self, blockStart.data(), blockCount.data(), blocks.data()};
 }
 
 template <class Real>

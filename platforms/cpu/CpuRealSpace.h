@@ -36,7 +36,6 @@ public:
     void addScaled(double s, const Vector& v, Vector& out) const;
 
 private:
-    using Entry = typename PairRows<Real>::Entry;
     bool listIsValid(const std::vector<numerics::Vec3>& x) const;
     void buildList(const std::vector<numerics::Vec3>& x);
     void fillRows();
@@ -58,9 +57,10 @@ private:
     std::vector<double> axes[3];             ///< the same, one array per coordinate
     std::vector<numerics::Vec3> atBuild;     ///< as given when the list was built
     std::vector<int32_t> candidates;         ///< neighbours within range + skin, row by row
-    std::vector<int64_t> start;              ///< [n + 1]
-    std::vector<int32_t> count;
-    std::vector<Entry> entries;
+    std::vector<int64_t> candidateStart;     ///< [n + 1]
+    std::vector<int64_t> blockStart;         ///< [n + 1]
+    std::vector<int32_t> blockCount;
+    std::vector<PairBlock<Real>> blocks;
     std::deque<Vector> krylov;
     mutable std::vector<double> partial;
 };

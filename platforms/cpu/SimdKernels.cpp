@@ -131,51 +131,53 @@ HWY_INLINE void gatherAny(const GridParticles<Real>& p, int from, int to, const 
         gatherPadded<16>(p, from, to, grids, u);
 }
 
-constexpr int CHUNK = 16; ///< pairs worked on at once: loops of this fixed length are whole SIMD vectors
+// Loops of the fixed length PAIR_LANES are whole SIMD vectors.
 
-/** CHUNK pairs, one array per quantity. */
+/** F and C of one block from its displacements; lanes from `used` on count for nothing. */
 template <class Real>
-struct PairChunk {
-    Real dx[CHUNK], dy[CHUNK], dz[CHUNK], F[CHUNK], C[CHUNK];
-};
-
-/** F and C of all CHUNK pairs; unused ones hold any finite displacement. */
-template <class Real>
-HWY_INLINE void evaluateChunk(const PairPolynomials<Real>& table, PairChunk<Real>& p) {
+HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, PairBlock<Real>& p) {
     const Real scale = 2/(table.rc*table.rc);
-    Real r2[CHUNK], t[CHUNK], waveF[CHUNK], waveC[CHUNK];
-    for (int i = 0; i < CHUNK; i++) {
-        r2[i] = p.dx[i]*p.dx[i] + p.dy[i]*p.dy[i] + p.dz[i]*p.dz[i];
-        t[i] = scale*r2[i] - 1;
-        waveF[i] = table.F[0];
-        waveC[i] = table.C[0];
+    Real r2[PAIR_LANES], t[PAIR_LANES], waveF[PAIR_LANES], waveC[PAIR_LANES];
+    for (int k = 0; k < PAIR_LANES; k++) {
+        r2[k] = p.dx[k]*p.dx[k] + p.dy[k]*p.dy[k] + p.dz[k]*p.dz[k];
+        t[k] = scale*r2[k] - 1;
+        waveF[k] = table.F[0];
+        waveC[k] = table.C[0];
     }
     for (int power = 1; power <= table.degreeF; power++)
-        for (int i = 0; i < CHUNK; i++)
-            waveF[i] = waveF[i]*t[i] + table.F[power];
+        for (int k = 0; k < PAIR_LANES; k++)
+            waveF[k] = waveF[k]*t[k] + table.F[power];
     for (int power = 1; power <= table.degreeC; power++)
-        for (int i = 0; i < CHUNK; i++)
-            waveC[i] = waveC[i]*t[i] + table.C[power];
-    for (int i = 0; i < CHUNK; i++) {
+        for (int k = 0; k < PAIR_LANES; k++)
+            waveC[k] = waveC[k]*t[k] + table.C[power];
+    for (int k = 0; k < PAIR_LANES; k++) {
         Real F, G;
-        numerics::rpyScalars(std::sqrt(r2[i]), F, G);
-        const Real C = (G - F)/r2[i];
-        p.F[i] = F - waveF[i];
-        p.C[i] = (r2[i] > 0 ? C : 0) - waveC[i]; // r r^T vanishes at r = 0
+        numerics::rpyScalars(std::sqrt(r2[k]), F, G);
+        const Real C = (G - F)/r2[k];
+        p.F[k] = F - waveF[k];
+        p.C[k] = (r2[k] > 0 ? C : 0) - waveC[k]; // r r^T vanishes at r = 0
     }
+    for (int k = used; k < PAIR_LANES; k++)
+        p.F[k] = p.C[k] = 0;
 }
 
-/** Nearest images of x_i - x_j for n <= CHUNK candidates, the last one repeated in the unused places. */
-HWY_INLINE void displaceChunk(const PairGeometry& g, int i, const int32_t* HWY_RESTRICT candidates, int n,
-                              double* HWY_RESTRICT dx, double* HWY_RESTRICT dy, double* HWY_RESTRICT dz) {
+template <class Real>
+HWY_INLINE void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last, PairBlock<Real>* blocks) {
+    for (int b = 0; b < count; b++)
+        evaluateBlock(table, b == count - 1 ? last : PAIR_LANES, blocks[b]);
+}
+
+/** Nearest images of x_i - x_j for n <= PAIR_LANES candidates, the last one repeated in the unused places. */
+HWY_INLINE void displace(const PairGeometry& g, int i, const int32_t* HWY_RESTRICT candidates, int n, double* HWY_RESTRICT dx,
+                         double* HWY_RESTRICT dy, double* HWY_RESTRICT dz) {
     const double inverseX = 1/g.box[0], inverseY = 1/g.box[2], inverseZ = 1/g.box[5];
-    for (int k = 0; k < CHUNK; k++) {
+    for (int k = 0; k < PAIR_LANES; k++) {
         const int32_t j = candidates[k < n ? k : n - 1];
         dx[k] = g.x[i] - g.x[j];
         dy[k] = g.y[i] - g.y[j];
         dz[k] = g.z[i] - g.z[j];
     }
-    for (int k = 0; k < CHUNK; k++) {
+    for (int k = 0; k < PAIR_LANES; k++) {
         const double nc = std::floor(dz[k]*inverseZ + 0.5);
         dx[k] -= nc*g.box[3];
         dy[k] -= nc*g.box[4];
@@ -187,68 +189,88 @@ HWY_INLINE void displaceChunk(const PairGeometry& g, int i, const int32_t* HWY_R
     }
 }
 
+/** Neighbours found so far that do not fill a block yet. */
 template <class Real>
-HWY_INLINE int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
-                          typename PairRows<Real>::Entry* row) {
-    const double range2 = g.range*g.range, scale = 1/g.radius;
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK], r2[CHUNK];
-    PairChunk<Real> chunk;
-    int found = 0;
-    for (int begin = 0; begin < n; begin += CHUNK) {
-        const int inChunk = (n - begin < CHUNK ? n - begin : CHUNK);
-        displaceChunk(g, i, candidates + begin, inChunk, dx, dy, dz);
-        for (int k = 0; k < CHUNK; k++) {
-            r2[k] = dx[k]*dx[k] + dy[k]*dy[k] + dz[k]*dz[k];
-            chunk.dx[k] = Real(dx[k]*scale);
-            chunk.dy[k] = Real(dy[k]*scale);
-            chunk.dz[k] = Real(dz[k]*scale);
+struct PairStage {
+    int n = 0;
+    int32_t neighbour[2*PAIR_LANES];
+    Real dx[2*PAIR_LANES], dy[2*PAIR_LANES], dz[2*PAIR_LANES];
+
+    /** Move the first `used` <= PAIR_LANES of them to a block. */
+    HWY_INLINE void moveTo(PairBlock<Real>& block, int used) {
+        for (int k = 0; k < PAIR_LANES; k++) {
+            const int from = (k < used ? k : 0);
+            block.neighbour[k] = neighbour[from];
+            block.dx[k] = dx[from];
+            block.dy[k] = dy[from];
+            block.dz[k] = dz[from];
         }
-        evaluateChunk(table, chunk);
-        for (int k = 0; k < inChunk; k++) { // no branch: an entry out of range is overwritten by the next
-            row[found] = {candidates[begin + k], chunk.F[k], chunk.C[k], chunk.dx[k], chunk.dy[k], chunk.dz[k]};
-            found += (r2[k] < range2);
+        for (int k = 0; k < PAIR_LANES; k++) {
+            neighbour[k] = neighbour[k + PAIR_LANES];
+            dx[k] = dx[k + PAIR_LANES];
+            dy[k] = dy[k + PAIR_LANES];
+            dz[k] = dz[k + PAIR_LANES];
         }
+        n -= used;
     }
-    return found;
-}
+};
 
 template <class Real>
-HWY_INLINE void evaluatePairsAny(const PairPolynomials<Real>& table, int count, typename PairRows<Real>::Entry* entries) {
-    PairChunk<Real> chunk;
-    for (int begin = 0; begin < count; begin += CHUNK) {
-        auto* e = entries + begin;
-        const int n = (count - begin < CHUNK ? count - begin : CHUNK);
-        for (int k = 0; k < CHUNK; k++) {
-            const auto& from = e[k < n ? k : n - 1];
-            chunk.dx[k] = from.dx;
-            chunk.dy[k] = from.dy;
-            chunk.dz[k] = from.dz;
+HWY_INLINE int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
+                          PairBlock<Real>* row) {
+    const double range2 = g.range*g.range, scale = 1/g.radius;
+    double dx[PAIR_LANES], dy[PAIR_LANES], dz[PAIR_LANES];
+    PairStage<Real> stage;
+    int blocks = 0;
+    for (int begin = 0; begin < n; begin += PAIR_LANES) {
+        const int lanes = (n - begin < PAIR_LANES ? n - begin : PAIR_LANES);
+        displace(g, i, candidates + begin, lanes, dx, dy, dz);
+        for (int k = 0; k < lanes; k++) { // no branch: one out of range is overwritten by the next
+            stage.neighbour[stage.n] = candidates[begin + k];
+            stage.dx[stage.n] = Real(dx[k]*scale);
+            stage.dy[stage.n] = Real(dy[k]*scale);
+            stage.dz[stage.n] = Real(dz[k]*scale);
+            stage.n += (dx[k]*dx[k] + dy[k]*dy[k] + dz[k]*dz[k] < range2);
         }
-        evaluateChunk(table, chunk);
-        for (int k = 0; k < n; k++) {
-            e[k].F = chunk.F[k];
-            e[k].C = chunk.C[k];
+        if (stage.n >= PAIR_LANES) {
+            stage.moveTo(row[blocks], PAIR_LANES);
+            evaluateBlock(table, PAIR_LANES, row[blocks++]);
         }
     }
+    if (stage.n > 0) {
+        const int used = stage.n;
+        stage.moveTo(row[blocks], used);
+        evaluateBlock(table, used, row[blocks++]);
+    }
+    return blocks;
 }
 
 template <class Real>
 HWY_INLINE void multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real* HWY_RESTRICT v,
                                 Real* HWY_RESTRICT out) {
     for (int i = from; i < to; i++) {
-        Real x = rows.self*v[3*size_t(i)], y = rows.self*v[3*size_t(i) + 1], z = rows.self*v[3*size_t(i) + 2];
-        const auto* entry = rows.entries + rows.start[i];
-        for (int k = 0; k < rows.count[i]; k++) {
-            const auto& e = entry[k];
-            const Real* w = v + 3*size_t(e.neighbour);
-            const Real along = e.C*(e.dx*w[0] + e.dy*w[1] + e.dz*w[2]);
-            x += e.F*w[0] + along*e.dx;
-            y += e.F*w[1] + along*e.dy;
-            z += e.F*w[2] + along*e.dz;
+        Real x[PAIR_LANES] = {}, y[PAIR_LANES] = {}, z[PAIR_LANES] = {};
+        const PairBlock<Real>* row = rows.blocks + rows.start[i];
+        for (int b = 0; b < rows.count[i]; b++) {
+            const PairBlock<Real>& p = row[b];
+            for (int k = 0; k < PAIR_LANES; k++) {
+                const int32_t j = 3*p.neighbour[k];
+                const Real vx = v[j], vy = v[j + 1], vz = v[j + 2];
+                const Real along = p.C[k]*(p.dx[k]*vx + p.dy[k]*vy + p.dz[k]*vz);
+                x[k] += p.F[k]*vx + along*p.dx[k];
+                y[k] += p.F[k]*vy + along*p.dy[k];
+                z[k] += p.F[k]*vz + along*p.dz[k];
+            }
         }
-        out[3*size_t(i)] = x;
-        out[3*size_t(i) + 1] = y;
-        out[3*size_t(i) + 2] = z;
+        const Real* own = v + 3*size_t(i);
+        Real sum[3] = {rows.self*own[0], rows.self*own[1], rows.self*own[2]};
+        for (int k = 0; k < PAIR_LANES; k++) {
+            sum[0] += x[k];
+            sum[1] += y[k];
+            sum[2] += z[k];
+        }
+        for (int c = 0; c < 3; c++)
+            out[3*size_t(i) + c] = sum[c];
     }
 }
 
@@ -374,14 +396,14 @@ void spreadPlaneF(const GridParticles<float>& p, int x, float* const planes[3]) 
 void spreadPlaneD(const GridParticles<double>& p, int x, double* const planes[3]) { spreadPlaneAny(p, x, planes); }
 void gatherF(const GridParticles<float>& p, int from, int to, const float* const g[3], float* u) { gatherAny(p, from, to, g, u); }
 void gatherD(const GridParticles<double>& p, int from, int to, const double* const g[3], double* u) { gatherAny(p, from, to, g, u); }
-int fillRowF(const PairGeometry& g, const PairPolynomials<float>& t, int i, const int32_t* c, int n, PairRows<float>::Entry* r) {
+int fillRowF(const PairGeometry& g, const PairPolynomials<float>& t, int i, const int32_t* c, int n, PairBlock<float>* r) {
     return fillRowAny(g, t, i, c, n, r);
 }
-int fillRowD(const PairGeometry& g, const PairPolynomials<double>& t, int i, const int32_t* c, int n, PairRows<double>::Entry* r) {
+int fillRowD(const PairGeometry& g, const PairPolynomials<double>& t, int i, const int32_t* c, int n, PairBlock<double>* r) {
     return fillRowAny(g, t, i, c, n, r);
 }
-void evaluatePairsF(const PairPolynomials<float>& t, int n, PairRows<float>::Entry* e) { evaluatePairsAny(t, n, e); }
-void evaluatePairsD(const PairPolynomials<double>& t, int n, PairRows<double>::Entry* e) { evaluatePairsAny(t, n, e); }
+void evaluateBlocksF(const PairPolynomials<float>& t, int n, int last, PairBlock<float>* b) { evaluateBlocksAny(t, n, last, b); }
+void evaluateBlocksD(const PairPolynomials<double>& t, int n, int last, PairBlock<double>* b) { evaluateBlocksAny(t, n, last, b); }
 void multiplyRowsF(const PairRows<float>& r, int from, int to, const float* v, float* out) { multiplyRowsAny(r, from, to, v, out); }
 void multiplyRowsD(const PairRows<double>& r, int from, int to, const double* v, double* out) { multiplyRowsAny(r, from, to, v, out); }
 void scaleWavesF(const WaveRow<float>& r, std::complex<float>* const b[3], float* s) { scaleWavesAny(r, b, s); }
@@ -403,8 +425,8 @@ HWY_EXPORT(gatherF);
 HWY_EXPORT(gatherD);
 HWY_EXPORT(fillRowF);
 HWY_EXPORT(fillRowD);
-HWY_EXPORT(evaluatePairsF);
-HWY_EXPORT(evaluatePairsD);
+HWY_EXPORT(evaluateBlocksF);
+HWY_EXPORT(evaluateBlocksD);
 HWY_EXPORT(multiplyRowsF);
 HWY_EXPORT(multiplyRowsD);
 HWY_EXPORT(scaleWavesF);
@@ -430,18 +452,18 @@ void gatherVelocities(const GridParticles<double>& p, int from, int to, const do
     HWY_DYNAMIC_DISPATCH(gatherD)(p, from, to, grids, u);
 }
 int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
-            PairRows<float>::Entry* row) {
+            PairBlock<float>* row) {
     return HWY_DYNAMIC_DISPATCH(fillRowF)(geometry, table, i, candidates, n, row);
 }
 int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
-            PairRows<double>::Entry* row) {
+            PairBlock<double>* row) {
     return HWY_DYNAMIC_DISPATCH(fillRowD)(geometry, table, i, candidates, n, row);
 }
-void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries) {
-    HWY_DYNAMIC_DISPATCH(evaluatePairsF)(table, count, entries);
+void evaluateBlocks(const PairPolynomials<float>& table, int count, int last, PairBlock<float>* blocks) {
+    HWY_DYNAMIC_DISPATCH(evaluateBlocksF)(table, count, last, blocks);
 }
-void evaluatePairs(const PairPolynomials<double>& table, int count, PairRows<double>::Entry* entries) {
-    HWY_DYNAMIC_DISPATCH(evaluatePairsD)(table, count, entries);
+void evaluateBlocks(const PairPolynomials<double>& table, int count, int last, PairBlock<double>* blocks) {
+    HWY_DYNAMIC_DISPATCH(evaluateBlocksD)(table, count, last, blocks);
 }
 void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out) {
     HWY_DYNAMIC_DISPATCH(multiplyRowsF)(rows, from, to, v, out);

@@ -36,17 +36,21 @@ struct WindowPolynomials {
     const Real* coefficients;
 };
 
-/** Neighbours within range, as rows of a symmetric sparse matrix of 3x3 blocks F I + C d d^T. */
+/** PAIR_LANES neighbours of one particle, one array per quantity; unused lanes hold zeros and a valid neighbour. */
+constexpr int PAIR_LANES = 8;
+template <class Real>
+struct PairBlock {
+    int32_t neighbour[PAIR_LANES];
+    Real F[PAIR_LANES], C[PAIR_LANES], dx[PAIR_LANES], dy[PAIR_LANES], dz[PAIR_LANES];
+};
+
+/** Neighbours within range, as rows of a symmetric sparse matrix of 3x3 blocks F I + C d d^T, d in radii. */
 template <class Real>
 struct PairRows {
-    struct Entry {
-        int32_t neighbour;
-        Real F, C, dx, dy, dz;
-    };
     Real self;                      ///< diagonal blocks
-    const int64_t* start;           ///< [n] first entry of a row
-    const int32_t* count;           ///< [n] entries of a row
-    const Entry* entries;
+    const int64_t* start;           ///< [n] first PairBlock of a row
+    const int32_t* count;           ///< [n] PairBlocks of a row
+    const PairBlock<Real>* blocks;
 };
 
 /** Real-space scalars by polynomials in t = 2 r^2/rc^2 - 1 (RealTable), highest power first; lengths in radii. */
@@ -90,17 +94,18 @@ void gatherVelocities(const GridParticles<float>& particles, int from, int to, c
 void gatherVelocities(const GridParticles<double>& particles, int from, int to, const double* const grids[3], double* u);
 
 /**
- * Write the entries of particle i for those of n candidate neighbours whose nearest image lies within the range, in their order.
- * @return number of entries
+ * Write the row of particle i: those of n candidate neighbours whose nearest image lies within the range, in their order.
+ * @param row  room for (n + PAIR_LANES - 1)/PAIR_LANES blocks
+ * @return number of blocks
  */
 int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
-            PairRows<float>::Entry* row);
+            PairBlock<float>* row);
 int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
-            PairRows<double>::Entry* row);
+            PairBlock<double>* row);
 
-/** F and C of `count` entries whose dx, dy, dz are set. */
-void evaluatePairs(const PairPolynomials<float>& table, int count, PairRows<float>::Entry* entries);
-void evaluatePairs(const PairPolynomials<double>& table, int count, PairRows<double>::Entry* entries);
+/** F and C of `count` blocks whose neighbours and displacements are set; lanes from `last` on in the last block are unused. */
+void evaluateBlocks(const PairPolynomials<float>& table, int count, int last, PairBlock<float>* blocks);
+void evaluateBlocks(const PairPolynomials<double>& table, int count, int last, PairBlock<double>* blocks);
 
 /** out[i] = M_R v for rows [from, to); v and out are [n][3]. */
 void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out);
