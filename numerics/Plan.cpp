@@ -17,6 +17,8 @@ constexpr double BUDGET_PER_HALF = 0.5;     ///< share of the tolerance that eac
 constexpr double LOCAL_VOLUME_FRACTION = 0.3; ///< clusters and chains are denser than the box mean
 constexpr double SMALLEST_XI = 1e-6, LARGEST_XI = 20; ///< splitting parameter times radius, what a Plan accepts
 constexpr double WIDEST_GRID = 32768;       ///< grid points along one axis; beyond, nothing can be allocated
+constexpr double SMALL_BOX = 12;            ///< in radii: here sums have few terms, which integrals estimate only roughly
+constexpr double SMALL_BOX_SHARE = 0.5;     ///< of the budget, therefore
 constexpr double LARGEST_LIST_RANGE = 0.499; ///< of the box: a neighbour list in single precision needs a margin below 1/2
 constexpr double TABLE_SHARE = 0.05;        ///< share of a half's budget for tables
 
@@ -38,12 +40,22 @@ double shapeFor(double error, int support) {
     return std::max(std::log(10/error), Window::minShape(support));
 }
 
+/**
+ * Points whose modes reach the same Nyquist wave number as n points do in the limit of a large box: an even grid has lost
+ * its Nyquist plane, which stands for half a mode spacing.
+ */
+int effectivePoints(int n) {
+    return n % 2 == 0 ? n - 1 : n;
+}
+
 std::array<int, 3> gridFor(const Lattice& box, double nyquist, int support) {
     std::array<int, 3> grid;
     for (int d = 0; d < 3; d++) {
         // The length of the box vector, not the width of the box, keeps every face of the Nyquist cell beyond `nyquist`.
         const double points = std::max(box.length(d)*nyquist/M_PI, double(support));
-        grid[d] = (points > WIDEST_GRID ? static_cast<int>(std::min(points, 2e9)) : nextFftSize(int(std::ceil(points))));
+        grid[d] = static_cast<int>(std::min(std::ceil(points), 2e9));
+        while (grid[d] <= WIDEST_GRID && (nextFftSize(grid[d]) != grid[d] || effectivePoints(grid[d]) < points))
+            grid[d]++;
     }
     return grid;
 }
@@ -59,7 +71,8 @@ double orderedPairs(const PlanRequest& r, double rc, bool sumImages) {
 class Planner {
 public:
     explicit Planner(const PlanRequest& request)
-        : request(request), box(scaledBox(request)), error(BUDGET_PER_HALF*request.tolerance),
+        : request(request), box(scaledBox(request)),
+          error(BUDGET_PER_HALF*request.tolerance*(box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1)),
           phi(std::max(volumeFraction(request), LOCAL_VOLUME_FRACTION)) {
     }
 
@@ -71,6 +84,7 @@ public:
         plan.a = request.radius;
         plan.xi = (wish.xi > 0 ? wish.xi : xi/plan.a);
         plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff : plan.a*plan.split->realCutoff(error, phi));
+        plan.realCutoff = std::min(plan.realCutoff, plan.a*plan.split->maxDistance()); // nothing is left beyond
         plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE*request.box.smallestWidth();
         plan.lanczosTolerance = (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5*request.tolerance);
         plan.tableError = TABLE_SHARE*error;
@@ -113,8 +127,12 @@ private:
         for (const WindowChoice& choice : {WindowChoice{digits, 1.0}, WindowChoice{digits - 1, digits <= 6 ? 1.24 : 1.14}}) {
             const int support = (wish.windowSupport > 0 ? wish.windowSupport : choice.support);
             std::array<int, 3> grid = gridFor(box, nyquist*choice.finer, support);
-            if (wish.grid[0] > 0)
+            if (wish.grid[0] > 0) {
+                const bool fineEnough = wish.grid[0] >= grid[0] && wish.grid[1] >= grid[1] && wish.grid[2] >= grid[2];
+                if (choice.finer > 1 && !fineEnough)
+                    continue; // the smaller support needs its finer grid
                 grid = wish.grid;
+            }
             const double points = double(grid[0])*grid[1]*grid[2];
             const double estimate =
                 request.directSums ? CostModel::directStep(request.numParticles, points, pairs, products)
@@ -164,6 +182,29 @@ void checkPlan(const Plan& plan) {
                 << " (1.57 support), where the window's transform has zeros; leave windowShape 0 for the automatic one";
         throw std::invalid_argument(message.str());
     }
+}
+
+/**
+ * Sum over the modes k != 0 of k^-4. The integral V/(2 pi)^3 Int (k^2 + c^2)^-2 d^3k = V/(8 pi c) equals it for the c that
+ * waveError() puts in place of the missing mode k = 0; c = 3.751/L in a cube.
+ */
+double inverseFourthPowers(const Lattice& box) {
+    constexpr double REACH = 4;         // in units of the shortest mode of the shortest box vector
+    constexpr int MOST_MODES = 64;      // per axis: enough for an aspect ratio of 16
+    const Matrix3 waves = box.waveVectors();
+    const double shortest = std::min({box.length(0), box.length(1), box.length(2)}), reach = REACH*2*M_PI/shortest;
+    int limit[3];
+    for (int d = 0; d < 3; d++)
+        limit[d] = std::min(MOST_MODES, static_cast<int>(std::ceil(REACH*box.length(d)/shortest)));
+    double sum = box.volume()/(2*M_PI*M_PI*reach); // all modes beyond the reach
+    for (int i = -limit[0]; i <= limit[0]; i++)
+        for (int j = -limit[1]; j <= limit[1]; j++)
+            for (int l = -limit[2]; l <= limit[2]; l++) {
+                const double k2 = (waves*Vec3(i, j, l)).squaredNorm();
+                if (k2 > 0 && k2 < reach*reach)
+                    sum += 1/(k2*k2);
+            }
+    return sum;
 }
 
 } // namespace
@@ -227,10 +268,10 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
     double nyquist = std::numeric_limits<double>::infinity();
     for (int d = 0; d < 3; d++) {
         waves.col(d) *= grid[d];
-        nyquist = std::min(nyquist, M_PI*grid[d]/box.length(d));
+        nyquist = std::min(nyquist, M_PI*effectivePoints(grid[d])/box.length(d));
     }
     const double measure = double(grid[0])*grid[1]*grid[2]/box.volume()/(8*M_PI*M_PI*M_PI);
-    const double damping = std::pow(3.75/std::cbrt(box.volume()), 2); // the sum over modes starts at 2 pi/L, not at 0
+    const double damping = std::pow(box.volume()/(8*M_PI*inverseFourthPowers(box)), 2);
     const double density = 3*phi/(4*M_PI);
     double pairs = 0, bias = 0;
     Matrix3 ripple = Matrix3::Zero(); // (direction of the ripple, component of the force)

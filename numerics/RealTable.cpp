@@ -20,8 +20,9 @@ RealTable makeRealTable(const Split& split, double rc, double maxError) {
     const auto distance = [rc](double t) { return rc*std::sqrt(std::max(0.0, 0.5*(1 + t))); };
     RealTable table;
     table.rc = rc;
-    table.self = split.realSelf();
     table.F = fitPolynomial([&](double t) { return split.waveScalars(distance(t)).F; }, maxError, 2, MAX_DEGREE);
+    // From the table, not from the split: then two particles at one place have exactly no relative mobility.
+    table.self = 1 - table.F(-1);
     table.C = fitPolynomial([&](double t) { return split.waveScalars(distance(t)).C; }, maxError/(rc*rc), 2, MAX_DEGREE);
     return table;
 }

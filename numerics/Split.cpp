@@ -27,6 +27,25 @@ BesselRatios besselRatios(double x) {
 constexpr int TAIL_POINTS = 160;
 constexpr double CONTACT = 2; ///< distance of two touching spheres in radii
 
+/** For each point of an equidistant table of f >= 0, the integral from there to the last point. */
+std::vector<double> integralsToInfinity(const std::vector<double>& f, double step) {
+    std::vector<double> integrals(f.size(), 0.0);
+    for (size_t i = f.size() - 1; i-- > 0;) {
+        // f decays like a Gaussian: a trapezium in its logarithm is far better than one in its value.
+        const double slope = (f[i] > 0 && f[i + 1] > 0 ? std::log(f[i]/f[i + 1]) : 0);
+        const double area = (std::fabs(slope) > 1e-3 ? (f[i] - f[i + 1])/slope : 0.5*(f[i] + f[i + 1]));
+        integrals[i] = integrals[i + 1] + step*area;
+    }
+    return integrals;
+}
+
+/** A table at a fractional index, linear in the logarithm; constant beyond its ends. */
+double logarithmicMean(const std::vector<double>& table, double index) {
+    const int i = std::clamp(static_cast<int>(index), 0, static_cast<int>(table.size()) - 2);
+    const double x = std::clamp(index - i, 0.0, 1.0);
+    return std::exp((1 - x)*std::log(std::max(table[i], 1e-300)) + x*std::log(std::max(table[i + 1], 1e-300)));
+}
+
 } // namespace
 
 void Split::prepare(double kMax, double range) {
@@ -88,30 +107,22 @@ double Split::tailDistance(int i) const {
 }
 
 void Split::prepareTails() {
-    std::vector<double> density(TAIL_POINTS);
+    std::vector<double> random(TAIL_POINTS), coherent(TAIL_POINTS);
     for (int i = 0; i < TAIL_POINTS; i++) {
         const double r = tailDistance(i);
         const PairScalars s = realScalars(r);
-        density[i] = 4*M_PI*r*r*(2*s.F*s.F + s.G*s.G)/3;
+        random[i] = 4*M_PI*r*r*(2*s.F*s.F + s.G*s.G)/3;
+        coherent[i] = 4*M_PI*r*r*std::fabs(2*s.F + s.G)/3;
     }
-    realTail.assign(TAIL_POINTS, 0.0);
-    const double step = tailDistance(1) - tailDistance(0);
-    for (int i = TAIL_POINTS - 2; i >= 0; i--) {
-        // The integrand decays like a Gaussian: a trapezium in its logarithm is far better than one in its value.
-        const double a = density[i], b = density[i + 1];
-        const double slope = (a > 0 && b > 0 ? std::log(a/b) : 0);
-        const double area = (std::fabs(slope) > 1e-3 ? (a - b)/slope : 0.5*(a + b));
-        realTail[i] = realTail[i + 1] + step*area;
-    }
+    randomTail = integralsToInfinity(random, tailDistance(1) - tailDistance(0));
+    coherentTail = integralsToInfinity(coherent, tailDistance(1) - tailDistance(0));
 }
 
 double Split::realTruncation(double rc, double phi) const {
     const double density = 3*phi/(4*M_PI);
     const double position = (rc - CONTACT)/(largestDistance - CONTACT)*(TAIL_POINTS - 1);
-    const int i = std::clamp(static_cast<int>(position), 0, TAIL_POINTS - 2);
-    const double x = std::clamp(position - i, 0.0, 1.0);
-    const double low = std::max(realTail[i], 1e-300), high = std::max(realTail[i + 1], 1e-300);
-    return std::sqrt(density*std::exp((1 - x)*std::log(low) + x*std::log(high)));
+    const double alike = density*logarithmicMean(coherentTail, position);
+    return std::sqrt(density*logarithmicMean(randomTail, position) + alike*alike);
 }
 
 double Split::realCutoff(double error, double phi) const {

@@ -48,7 +48,10 @@ public:
     double waveTruncation(double kMax, double phi) const;
     /** Smallest wave number above which waveTruncation() is at most error. */
     double waveCutoff(double error, double phi) const;
-    /** Root mean square error of M f, for unit random forces at volume fraction phi, caused by dropping all pairs beyond rc [T13]. */
+    /**
+     * Error of M f, for unit forces at volume fraction phi, caused by dropping all pairs beyond rc [T13]: the root mean square
+     * for random forces, and what adds up if all forces are alike.
+     */
     double realTruncation(double rc, double phi) const;
     /** Smallest distance (>= 2, beyond overlap) above which realTruncation() is at most error. */
     double realCutoff(double error, double phi) const;
@@ -66,8 +69,8 @@ private:
 
     double largestWaveNumber = 0, largestDistance = 0;
     std::vector<double> waveNumbers, weights;
-    /** realTail[i]: Int from tailDistance(i) to infinity of 4 pi r^2 (2 F^2 + G^2)/3 dr. */
-    std::vector<double> realTail;
+    /** From tailDistance(i) to infinity: Int 4 pi r^2 (2 F^2 + G^2)/3 dr and Int 4 pi r^2 |2 F + G|/3 dr. */
+    std::vector<double> randomTail, coherentTail;
     double tailDistance(int i) const;
 };
 
