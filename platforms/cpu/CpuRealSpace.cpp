@@ -123,7 +123,7 @@ void CpuRealSpace<Real>::fillRows() {
                                    {v(0, 0), v(0, 1), v(1, 1), v(0, 2), v(1, 2), v(2, 2)}, range, a};
     threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
         for (int i = from; i < to; i++)
-            blockCount[i] = fillRow(geometry, table, i, candidates.data() + candidateStart[i],
+            blockCount[i] = simd.fillRow(geometry, table, i, candidates.data() + candidateStart[i],
                                     int(candidateStart[i + 1] - candidateStart[i]), blocks.data() + blockStart[i]);
     });
 }
@@ -152,7 +152,7 @@ void CpuRealSpace<Real>::fillRowsWithImages() {
                 block.dy[used] = Real(d[1]/a);
                 block.dz[used++] = Real(d[2]/a);
             }
-        evaluateBlocks(table, static_cast<int>(found[i].size()), used, found[i].data());
+        simd.evaluateBlocks(table, static_cast<int>(found[i].size()), used, found[i].data());
     });
     blockStart.assign(n + 1, 0);
     blocks.clear();
@@ -172,7 +172,7 @@ template <class Real>
 void CpuRealSpace<Real>::multiply(const Vector& v, Vector& out) const {
     const PairRows<Real> matrix = rows();
     threads.runBlocks(static_cast<int>(positions.size()),
-                      [&](int from, int to, int) { multiplyRows(matrix, from, to, v.data(), out.data()); });
+                      [&](int from, int to, int) { simd.multiplyRows(matrix, from, to, v.data(), out.data()); });
 }
 
 template <class Real>

@@ -47,6 +47,7 @@ private:
     double a, range, skin;
     bool sumImages;
     const Threads& threads;
+    const SimdKernels<Real>& simd = simdKernels<Real>();
     OpenMM::ThreadPool& pool;
     Real self;
     std::vector<Real> coefficientsF, coefficientsC;

@@ -99,7 +99,7 @@ void CpuWaveSpace<Real>::setPositions(const std::vector<Vec3>& x) {
                 sortedFirst[3*slot + d] = first[3*order[slot] + d];
                 offsets[3*slot + d] = unsorted[3*order[slot] + d];
             }
-        evaluateWindows(window, offsets.data() + 3*from, to - from, weights.data() + 3*size_t(from)*padded);
+        simd.evaluateWindows(window, offsets.data() + 3*from, to - from, weights.data() + 3*size_t(from)*padded);
     });
 }
 
@@ -133,7 +133,7 @@ void CpuWaveSpace<Real>::spread(const Real* forces) {
     threads.run(size[0], [&](int x, int) {
         const size_t plane = size_t(x)*size[1]*rowLength;
         Real* planes[3] = {grids[0].begin() + plane, grids[1].begin() + plane, grids[2].begin() + plane};
-        spreadPlane(sorted, x, planes);
+        simd.spreadPlane(sorted, x, planes);
         for (Real* p : planes)
             fft->planeForward(p);
     });
@@ -154,7 +154,7 @@ void CpuWaveSpace<Real>::scale(bool forced, Real noise, const NoiseKey& key) {
         Real* scratch = blocks[thread]->begin() + 3*2*size[0]*blockLength;
         for (int c = 0; c < 3 && forced; c++)
             fft->columnForward(grids[c].begin() + y*rowLength, columns[c]);
-        scaleWaves(row, columns, scratch);
+        simd.scaleWaves(row, columns, scratch);
         for (int c = 0; c < 3; c++)
             fft->columnBackward(columns[c], grids[c].begin() + y*rowLength);
     });
@@ -177,7 +177,7 @@ void CpuWaveSpace<Real>::gather(Real* u) {
     const GridParticles<Real> sorted = particles();
     const Real* data[3] = {grids[0].begin(), grids[1].begin(), grids[2].begin()};
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
-        gatherVelocities(sorted, from, to, data, sortedVelocities.data());
+        simd.gatherVelocities(sorted, from, to, data, sortedVelocities.data());
         for (int slot = from; slot < to; slot++)
             for (int c = 0; c < 3; c++)
                 u[3*size_t(order[slot]) + c] += sortedVelocities[3*size_t(slot) + c];

@@ -40,6 +40,7 @@ private:
     numerics::Lattice box;
     double a;
     const Threads& threads;
+    const SimdKernels<Real>& simd = simdKernels<Real>();
     int support, padded, size[3], windowDegree;
     size_t rowLength, blockLength;
     std::vector<Real> windowCoefficients;

@@ -30,7 +30,7 @@ HWY_INLINE void evaluateWindowsPadded(const WindowPolynomials<Real>& window, con
 }
 
 template <class Real>
-HWY_INLINE void evaluateWindowsAny(const WindowPolynomials<Real>& window, const Real* t, int n, Real* weights) {
+void evaluateWindowsAny(const WindowPolynomials<Real>& window, const Real* t, int n, Real* weights) {
     if (window.padded == 4)
         evaluateWindowsPadded<4>(window, t, n, weights);
     else if (window.padded == 8)
@@ -82,7 +82,7 @@ HWY_INLINE void spreadPlanePadded(const GridParticles<Real>& p, int x, Real* con
 }
 
 template <class Real>
-HWY_INLINE void spreadPlaneAny(const GridParticles<Real>& p, int x, Real* const planes[3]) {
+void spreadPlaneAny(const GridParticles<Real>& p, int x, Real* const planes[3]) {
     if (p.padded == 4)
         spreadPlanePadded<4>(p, x, planes);
     else if (p.padded == 8)
@@ -122,7 +122,7 @@ HWY_INLINE void gatherPadded(const GridParticles<Real>& p, int from, int to, con
 }
 
 template <class Real>
-HWY_INLINE void gatherAny(const GridParticles<Real>& p, int from, int to, const Real* const grids[3], Real* u) {
+void gatherAny(const GridParticles<Real>& p, int from, int to, const Real* const grids[3], Real* u) {
     if (p.padded == 4)
         gatherPadded<4>(p, from, to, grids, u);
     else if (p.padded == 8)
@@ -162,7 +162,7 @@ HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, Pair
 }
 
 template <class Real>
-HWY_INLINE void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last, PairBlock<Real>* blocks) {
+void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last, PairBlock<Real>* blocks) {
     for (int b = 0; b < count; b++)
         evaluateBlock(table, b == count - 1 ? last : PAIR_LANES, blocks[b]);
 }
@@ -216,7 +216,7 @@ struct PairStage {
 };
 
 template <class Real>
-HWY_INLINE int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
+int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
                           PairBlock<Real>* row) {
     const double range2 = g.range*g.range, scale = 1/g.radius;
     double dx[PAIR_LANES], dy[PAIR_LANES], dz[PAIR_LANES];
@@ -246,7 +246,7 @@ HWY_INLINE int fillRowAny(const PairGeometry& g, const PairPolynomials<Real>& ta
 }
 
 template <class Real>
-HWY_INLINE void multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real* HWY_RESTRICT v,
+void multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real* HWY_RESTRICT v,
                                 Real* HWY_RESTRICT out) {
     for (int i = from; i < to; i++) {
         Real x[PAIR_LANES] = {}, y[PAIR_LANES] = {}, z[PAIR_LANES] = {};
@@ -351,7 +351,7 @@ HWY_INLINE void fillModeNoise(const WaveRow<Real>& row, int nx, int count, Real*
 }
 
 template <class Real>
-HWY_INLINE void scaleWavesAny(const WaveRow<Real>& row, std::complex<Real>* const blocks[3], Real* HWY_RESTRICT scratch) {
+void scaleWavesAny(const WaveRow<Real>& row, std::complex<Real>* const blocks[3], Real* HWY_RESTRICT scratch) {
     const Real* b = row.waveVectors;
     for (size_t i = 0; row.noise == 0 && i < waveScratch(row.blockLength); i++)
         scratch[i] = 0;
@@ -389,26 +389,19 @@ HWY_INLINE void scaleWavesAny(const WaveRow<Real>& row, std::complex<Real>* cons
     }
 }
 
-// One name per precision, because dispatch tables hold functions, not templates.
-void evaluateWindowsF(const WindowPolynomials<float>& w, const float* t, int n, float* out) { evaluateWindowsAny(w, t, n, out); }
-void evaluateWindowsD(const WindowPolynomials<double>& w, const double* t, int n, double* out) { evaluateWindowsAny(w, t, n, out); }
-void spreadPlaneF(const GridParticles<float>& p, int x, float* const planes[3]) { spreadPlaneAny(p, x, planes); }
-void spreadPlaneD(const GridParticles<double>& p, int x, double* const planes[3]) { spreadPlaneAny(p, x, planes); }
-void gatherF(const GridParticles<float>& p, int from, int to, const float* const g[3], float* u) { gatherAny(p, from, to, g, u); }
-void gatherD(const GridParticles<double>& p, int from, int to, const double* const g[3], double* u) { gatherAny(p, from, to, g, u); }
-int fillRowF(const PairGeometry& g, const PairPolynomials<float>& t, int i, const int32_t* c, int n, PairBlock<float>* r) {
-    return fillRowAny(g, t, i, c, n, r);
+template <class Real>
+SimdKernels<Real> allKernels() {
+    return {evaluateWindowsAny<Real>, spreadPlaneAny<Real>,    gatherAny<Real>,    fillRowAny<Real>,
+            evaluateBlocksAny<Real>,  multiplyRowsAny<Real>, scaleWavesAny<Real>};
 }
-int fillRowD(const PairGeometry& g, const PairPolynomials<double>& t, int i, const int32_t* c, int n, PairBlock<double>* r) {
-    return fillRowAny(g, t, i, c, n, r);
+
+// Dispatch tables hold functions, not templates: one name per precision.
+SimdKernels<float> singleKernels() {
+    return allKernels<float>();
 }
-void evaluateBlocksF(const PairPolynomials<float>& t, int n, int last, PairBlock<float>* b) { evaluateBlocksAny(t, n, last, b); }
-void evaluateBlocksD(const PairPolynomials<double>& t, int n, int last, PairBlock<double>* b) { evaluateBlocksAny(t, n, last, b); }
-void multiplyRowsF(const PairRows<float>& r, int from, int to, const float* v, float* out) { multiplyRowsAny(r, from, to, v, out); }
-void multiplyRowsD(const PairRows<double>& r, int from, int to, const double* v, double* out) { multiplyRowsAny(r, from, to, v, out); }
-void scaleWavesF(const WaveRow<float>& r, std::complex<float>* const b[3], float* s) { scaleWavesAny(r, b, s); }
-void scaleWavesD(const WaveRow<double>& r, std::complex<double>* const b[3], double* s) { scaleWavesAny(r, b, s); }
-const char* targetName() { return hwy::TargetName(HWY_TARGET); }
+SimdKernels<double> doubleKernels() {
+    return allKernels<double>();
+}
 
 } // namespace HWY_NAMESPACE
 } // namespace PSE
@@ -417,68 +410,19 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace PSE {
 
-HWY_EXPORT(evaluateWindowsF);
-HWY_EXPORT(evaluateWindowsD);
-HWY_EXPORT(spreadPlaneF);
-HWY_EXPORT(spreadPlaneD);
-HWY_EXPORT(gatherF);
-HWY_EXPORT(gatherD);
-HWY_EXPORT(fillRowF);
-HWY_EXPORT(fillRowD);
-HWY_EXPORT(evaluateBlocksF);
-HWY_EXPORT(evaluateBlocksD);
-HWY_EXPORT(multiplyRowsF);
-HWY_EXPORT(multiplyRowsD);
-HWY_EXPORT(scaleWavesF);
-HWY_EXPORT(scaleWavesD);
-HWY_EXPORT(targetName);
+HWY_EXPORT(singleKernels);
+HWY_EXPORT(doubleKernels);
 
-void evaluateWindows(const WindowPolynomials<float>& w, const float* t, int n, float* out) {
-    HWY_DYNAMIC_DISPATCH(evaluateWindowsF)(w, t, n, out);
+template <>
+const SimdKernels<float>& simdKernels<float>() {
+    static const SimdKernels<float> kernels = HWY_DYNAMIC_DISPATCH(singleKernels)();
+    return kernels;
 }
-void evaluateWindows(const WindowPolynomials<double>& w, const double* t, int n, double* out) {
-    HWY_DYNAMIC_DISPATCH(evaluateWindowsD)(w, t, n, out);
-}
-void spreadPlane(const GridParticles<float>& p, int x, float* const planes[3]) {
-    HWY_DYNAMIC_DISPATCH(spreadPlaneF)(p, x, planes);
-}
-void spreadPlane(const GridParticles<double>& p, int x, double* const planes[3]) {
-    HWY_DYNAMIC_DISPATCH(spreadPlaneD)(p, x, planes);
-}
-void gatherVelocities(const GridParticles<float>& p, int from, int to, const float* const grids[3], float* u) {
-    HWY_DYNAMIC_DISPATCH(gatherF)(p, from, to, grids, u);
-}
-void gatherVelocities(const GridParticles<double>& p, int from, int to, const double* const grids[3], double* u) {
-    HWY_DYNAMIC_DISPATCH(gatherD)(p, from, to, grids, u);
-}
-int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
-            PairBlock<float>* row) {
-    return HWY_DYNAMIC_DISPATCH(fillRowF)(geometry, table, i, candidates, n, row);
-}
-int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
-            PairBlock<double>* row) {
-    return HWY_DYNAMIC_DISPATCH(fillRowD)(geometry, table, i, candidates, n, row);
-}
-void evaluateBlocks(const PairPolynomials<float>& table, int count, int last, PairBlock<float>* blocks) {
-    HWY_DYNAMIC_DISPATCH(evaluateBlocksF)(table, count, last, blocks);
-}
-void evaluateBlocks(const PairPolynomials<double>& table, int count, int last, PairBlock<double>* blocks) {
-    HWY_DYNAMIC_DISPATCH(evaluateBlocksD)(table, count, last, blocks);
-}
-void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out) {
-    HWY_DYNAMIC_DISPATCH(multiplyRowsF)(rows, from, to, v, out);
-}
-void multiplyRows(const PairRows<double>& rows, int from, int to, const double* v, double* out) {
-    HWY_DYNAMIC_DISPATCH(multiplyRowsD)(rows, from, to, v, out);
-}
-void scaleWaves(const WaveRow<float>& row, std::complex<float>* const blocks[3], float* scratch) {
-    HWY_DYNAMIC_DISPATCH(scaleWavesF)(row, blocks, scratch);
-}
-void scaleWaves(const WaveRow<double>& row, std::complex<double>* const blocks[3], double* scratch) {
-    HWY_DYNAMIC_DISPATCH(scaleWavesD)(row, blocks, scratch);
-}
-const char* instructionSet() {
-    return HWY_DYNAMIC_DISPATCH(targetName)();
+
+template <>
+const SimdKernels<double>& simdKernels<double>() {
+    static const SimdKernels<double> kernels = HWY_DYNAMIC_DISPATCH(doubleKernels)();
+    return kernels;
 }
 
 } // namespace PSE

@@ -81,46 +81,37 @@ struct WaveRow {
     numerics::NoiseKey key;
 };
 
-/** weights[particle][axis][point] from t[particle][axis], for n particles. */
-void evaluateWindows(const WindowPolynomials<float>& window, const float* t, int n, float* weights);
-void evaluateWindows(const WindowPolynomials<double>& window, const double* t, int n, double* weights);
+/** The inner loops for one instruction set. */
+template <class Real>
+struct SimdKernels {
+    /** weights[particle][axis][point] from t[particle][axis], for n particles. */
+    void (*evaluateWindows)(const WindowPolynomials<Real>& window, const Real* t, int n, Real* weights);
+    /** Set three planes [y][z] to the forces of all particles that touch the plane x; row ends are folded back. */
+    void (*spreadPlane)(const GridParticles<Real>& particles, int x, Real* const planes[3]);
+    /** u[particle][3] for particles [from, to) from the three grids, whose row ends repeat their beginnings. */
+    void (*gatherVelocities)(const GridParticles<Real>& particles, int from, int to, const Real* const grids[3], Real* u);
+    /**
+     * Write the row of particle i: those of n candidate neighbours whose nearest image lies within the range, in their order;
+     * `row` has room for (n + PAIR_LANES - 1)/PAIR_LANES blocks. Returns the number of blocks.
+     */
+    int (*fillRow)(const PairGeometry& geometry, const PairPolynomials<Real>& table, int i, const int32_t* candidates, int n,
+                   PairBlock<Real>* row);
+    /** F and C of `count` blocks whose neighbours and displacements are set; lanes from `last` on in the last one are unused. */
+    void (*evaluateBlocks)(const PairPolynomials<Real>& table, int count, int last, PairBlock<Real>* blocks);
+    /** out = M_R v for rows [from, to); v and out are [n][3]. */
+    void (*multiplyRows)(const PairRows<Real>& rows, int from, int to, const Real* v, Real* out);
+    /** u = (I - kk)(D f + noise sqrt(D) z), in place, for three blocks [x][z] of complex numbers; scratch: waveScratch() reals. */
+    void (*scaleWaves)(const WaveRow<Real>& row, std::complex<Real>* const blocks[3], Real* scratch);
+};
 
-/** Add the forces of all particles that touch the plane x to the three planes [y][z]; row ends are folded back. */
-void spreadPlane(const GridParticles<float>& particles, int x, float* const planes[3]);
-void spreadPlane(const GridParticles<double>& particles, int x, double* const planes[3]);
+/** The loops for the best instruction set of this machine. */
+template <class Real>
+const SimdKernels<Real>& simdKernels();
 
-/** u[particle][3] for particles [from, to) from the three grids, whose row ends repeat their beginnings. */
-void gatherVelocities(const GridParticles<float>& particles, int from, int to, const float* const grids[3], float* u);
-void gatherVelocities(const GridParticles<double>& particles, int from, int to, const double* const grids[3], double* u);
-
-/**
- * Write the row of particle i: those of n candidate neighbours whose nearest image lies within the range, in their order.
- * @param row  room for (n + PAIR_LANES - 1)/PAIR_LANES blocks
- * @return number of blocks
- */
-int fillRow(const PairGeometry& geometry, const PairPolynomials<float>& table, int i, const int32_t* candidates, int n,
-            PairBlock<float>* row);
-int fillRow(const PairGeometry& geometry, const PairPolynomials<double>& table, int i, const int32_t* candidates, int n,
-            PairBlock<double>* row);
-
-/** F and C of `count` blocks whose neighbours and displacements are set; lanes from `last` on in the last block are unused. */
-void evaluateBlocks(const PairPolynomials<float>& table, int count, int last, PairBlock<float>* blocks);
-void evaluateBlocks(const PairPolynomials<double>& table, int count, int last, PairBlock<double>* blocks);
-
-/** out[i] = M_R v for rows [from, to); v and out are [n][3]. */
-void multiplyRows(const PairRows<float>& rows, int from, int to, const float* v, float* out);
-void multiplyRows(const PairRows<double>& rows, int from, int to, const double* v, double* out);
-
-/** u = (I - kk)(D f + noise sqrt(D) z), in place, for three blocks [x][z] of complex numbers. */
-void scaleWaves(const WaveRow<float>& row, std::complex<float>* const blocks[3], float* scratch);
-void scaleWaves(const WaveRow<double>& row, std::complex<double>* const blocks[3], double* scratch);
 /** Reals of scratch that scaleWaves() needs: real and imaginary parts of three components, for a row of modes. */
 inline size_t waveScratch(size_t blockLength) {
     return 6*blockLength;
 }
-
-/** Name of the instruction set in use. */
-const char* instructionSet();
 
 } // namespace PSE
 

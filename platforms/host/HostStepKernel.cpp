@@ -73,7 +73,7 @@ void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrato
     viscosity = integrator.getViscosity();
     seed = integrator.getRandomNumberSeed();
     while (seed == 0)
-        seed = osrngseed();
+        seed = osrngseed() & 0x7FFFFFFF; // positive, like the seeds that users write
     if (!scene.hydrodynamics || scene.mobile.empty()) {
         engine.reset(new FreeDrainingEngine(viscosity, scene.radii, scene.mobile, clock));
         return;
