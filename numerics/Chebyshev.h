@@ -13,7 +13,7 @@ namespace PSE::numerics {
  */
 struct Polynomial {
     std::vector<double> chebyshev; ///< f(t) = sum c_n T_n(t)
-    std::vector<double> powers;    ///< f(t) = sum p_n t^n
+    std::vector<double> powers;    ///< f(t) = sum p_n t^n; loses digits where the degree is high (RealTable: xi rc > 8)
 
     int degree() const { return static_cast<int>(chebyshev.size()) - 1; }
     /** Clenshaw's recurrence in the Chebyshev basis. */

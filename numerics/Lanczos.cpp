@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/Lanczos.h"
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -26,22 +27,30 @@ bool LanczosTridiagonal::add(double alpha, double beta) {
     }
     const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
     const Eigen::VectorXd next = eigen.eigenvectors()*roots.cwiseProduct(eigen.eigenvectors().row(0).transpose());
-    double change = next.squaredNorm();
+    double square = next.squaredNorm();
     if (n > 1)
-        change = (next.head(n - 1) - solution).squaredNorm() + next[n - 1]*next[n - 1];
+        square = (next.head(n - 1) - solution).squaredNorm() + next[n - 1]*next[n - 1];
     solution = next;
+    const double change = std::sqrt(square/diagonal[0]);
     const bool exhausted = beta <= 1e-14*highest;
-    if (exhausted || (n > 1 && std::sqrt(change) <= tolerance*std::sqrt(diagonal[0])))
+    if (exhausted || (n > 1 && remaining(change) <= tolerance))
         return true;
     if (n == MAX_ITERATIONS) {
         std::ostringstream message;
         message << "the real-space noise did not converge in " << n << " Lanczos iterations: relative change "
-                << std::sqrt(change/diagonal[0]) << ", wanted " << tolerance << ", smallest eigenvalue " << lowest
+                << change << ", wanted " << tolerance << ", smallest eigenvalue " << lowest
                 << " of a largest of " << highest << "; loosen the tolerance or set a larger splitting parameter";
         throw std::runtime_error(message.str());
     }
     offDiagonal.push_back(beta);
+    lastRatio = (n > 1 ? change/lastChange : 0);
+    lastChange = change;
     return false;
+}
+
+double LanczosTridiagonal::remaining(double change) const {
+    const double ratio = std::min(0.99, std::max(lastRatio, change/lastChange));
+    return change*ratio/(1 - ratio);
 }
 
 } // namespace PSE::numerics

@@ -6,6 +6,7 @@
 // operations that each platform supplies.
 
 #include "numerics/Vec3.h"
+#include <cmath>
 #include <vector>
 
 namespace PSE::numerics {
@@ -24,8 +25,10 @@ public:
         : tolerance(tolerance), negativeTolerance(negativeTolerance) {}
 
     /**
-     * Add a row. M^{1/2} z is accepted once it changed by less than the tolerance, relative to |M^{1/2} z|, whose
-     * exact value |z| sqrt(alpha_1) is known after the first iteration.
+     * Add a row. The changes of M^{1/2} z from one iteration to the next fall about geometrically; it is accepted once
+     * the sum of those still to come is below the tolerance, relative to |M^{1/2} z|, whose exact value
+     * |z| sqrt(alpha_1) is known after the first iteration. The true error is below 2 tolerances for condition numbers
+     * up to 50, below 6 up to 1e8.
      * @param alpha  diagonal entry of this iteration
      * @param beta   norm of the next basis vector before normalisation (0: the Krylov space is exhausted)
      * @return whether the process is finished
@@ -37,7 +40,10 @@ public:
     const Eigen::VectorXd& coefficients() const { return solution; }
 
 private:
-    double tolerance, negativeTolerance;
+    /** Estimate of the changes still to come, from the larger of the last two ratios of successive changes. */
+    double remaining(double change) const;
+
+    double tolerance, negativeTolerance, lastChange = 1, lastRatio = 0;
     std::vector<double> diagonal, offDiagonal;
     Eigen::VectorXd solution;
 };

@@ -16,7 +16,7 @@ Lattice::Lattice(const Vec3& a, const Vec3& b, const Vec3& c) {
         throw std::invalid_argument("the periodic box vectors are not in reduced form (a = (ax, 0, 0), b = (bx, by, 0), "
                                     "c = (cx, cy, cz) with ax, by, cz > 0)");
     inverse = boxVectors.inverse();
-    // The inverse of a lower triangular matrix stored as its transpose is triangular too: keep its zeros exact.
+    // Upper triangular, as the matrix is: keep its zeros exact.
     inverse(1, 0) = inverse(2, 0) = inverse(2, 1) = 0;
 }
 

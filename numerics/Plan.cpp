@@ -15,11 +15,18 @@ namespace {
 
 constexpr double BUDGET_PER_HALF = 0.5;     ///< share of the tolerance that each half may use
 constexpr double LOCAL_VOLUME_FRACTION = 0.3; ///< clusters and chains are denser than the box mean
-constexpr double SMALLEST_XI = 1e-6, LARGEST_XI = 20; ///< splitting parameter times radius, what a Plan accepts
+constexpr double SMALLEST_XI = 1e-6, LARGEST_XI = 4; ///< splitting parameter times radius, what a Plan accepts
+constexpr double LARGEST_RANGE = 8.2;        ///< xi rc: what the polynomials of RealTable resolve
+constexpr double SINGLE_RANGE = 6;           ///< xi rc up to which those polynomials keep 5e-7 in single precision
+constexpr double LARGEST_SHAPE = 60;         ///< beta; exp(beta) must stay finite, and no tolerance asks for more than 28
 constexpr double WIDEST_GRID = 32768;       ///< grid points along one axis; beyond, nothing can be allocated
 constexpr double SMALL_BOX = 12;            ///< in radii: here sums have few terms, which integrals estimate only roughly
 constexpr double SMALL_BOX_SHARE = 0.5;     ///< of the budget, therefore
 constexpr double LARGEST_LIST_RANGE = 0.499; ///< of the box: a neighbour list in single precision needs a margin below 1/2
+/// Radii. What the window does to waves longer than this is a fixed small share of the velocity that they carry, which
+/// the tolerance is relative to: farther pairs do not count.
+constexpr double LARGEST_EXTENT = 12;
+constexpr int LAST_ATTEMPT = 12;            ///< refinements of grid and window beyond the rules [T15]
 constexpr double TABLE_SHARE = 0.05;        ///< share of a half's budget for tables
 
 double volumeFraction(const PlanRequest& r) {
@@ -73,7 +80,8 @@ public:
     explicit Planner(const PlanRequest& request)
         : request(request), box(scaledBox(request)),
           error(BUDGET_PER_HALF*request.tolerance*(box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1)),
-          phi(std::max(volumeFraction(request), LOCAL_VOLUME_FRACTION)) {
+          meanPhi(volumeFraction(request)), phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)),
+          extent(std::min(LARGEST_EXTENT, std::cbrt(4.0/3*M_PI*request.numParticles/phi))) {
     }
 
     /** @param xi  in 1/a */
@@ -83,28 +91,49 @@ public:
         plan.split = std::make_shared<HasimotoSplit>(xi);
         plan.a = request.radius;
         plan.xi = (wish.xi > 0 ? wish.xi : xi/plan.a);
-        plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff : plan.a*plan.split->realCutoff(error, phi));
-        plan.realCutoff = std::min(plan.realCutoff, plan.a*plan.split->maxDistance()); // nothing is left beyond
+        plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff : plan.a*plan.split->realCutoff(error, phi, meanPhi));
+        plan.realCutoff = std::min(plan.realCutoff, plan.a*LARGEST_RANGE/xi); // little is left beyond, and counted
         plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE*request.box.smallestWidth();
         plan.lanczosTolerance = (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5*request.tolerance);
         plan.tableError = TABLE_SHARE*error;
-        plan.precision = (request.tolerance >= request.singleFloor ? Precision::Single : Precision::Double);
+        const bool single = (request.tolerance >= request.singleFloor && plan.xi*plan.realCutoff <= SINGLE_RANGE);
+        plan.precision = (single ? Precision::Single : Precision::Double);
         chooseWindow(plan, cost);
         return plan;
     }
 
-    /** Grow an automatic grid until the full estimate of the wave error keeps the budget; set the predicted error. */
+    /**
+     * Refine an automatic grid, and widen an automatic window where that does not help, until the full estimate of
+     * the wave error keeps the budget; set the predicted error.
+     */
     void finish(Plan& plan) const {
-        const bool automatic = (request.overrides.grid[0] == 0);
-        const double budget = error;
+        const PlanOverrides& wish = request.overrides;
+        const bool freeGrid = (wish.grid[0] == 0), freeWindow = (wish.windowSupport == 0 && wish.windowShape == 0);
         double wave = waveErrorOf(plan);
-        for (int attempt = 0; automatic && wave > budget && attempt < 40; attempt++) {
+        for (int attempt = 1; freeGrid && wave > error && attempt <= LAST_ATTEMPT; attempt++) {
+            if (freeWindow && attempt % 3 == 0) {
+                plan.windowSupport++;
+                plan.windowShape = shapeFor(error, plan.windowSupport);
+            }
             for (int d = 0; d < 3; d++)
-                plan.grid[d] = nextFftSize(plan.grid[d] + 1);
+                plan.grid[d] = nextFftSize(std::max(plan.grid[d] + 1, plan.windowSupport));
             wave = waveErrorOf(plan);
         }
-        const double real = plan.split->realTruncation(plan.realCutoff/plan.a, phi);
+        const double real = plan.split->realTruncation(plan.realCutoff/plan.a, phi, meanPhi);
         plan.predictedError = std::hypot(wave, real);
+        if (wish.realCutoff == 0 && !(real <= request.tolerance)) {
+            std::ostringstream message;
+            message << "splitting parameter " << plan.xi << " /nm leaves an error of " << real << " in the real half, the "
+                    << "tolerance is " << request.tolerance << "; choose a smaller splitting parameter, or 0 for the automatic one";
+            throw std::invalid_argument(message.str());
+        }
+        if (freeGrid && !(wave <= request.tolerance)) {
+            std::ostringstream message;
+            message << "a window of support " << plan.windowSupport << " and shape " << plan.windowShape
+                    << " leaves an error of " << wave << " on any grid, the tolerance is " << request.tolerance
+                    << "; prescribe a larger support, or neither support nor shape";
+            throw std::invalid_argument(message.str());
+        }
     }
 
 private:
@@ -114,7 +143,7 @@ private:
     }
 
     double waveErrorOf(const Plan& plan) const {
-        return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
+        return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi, extent);
     }
 
     void chooseWindow(Plan& plan, double& cost) const {
@@ -148,7 +177,7 @@ private:
 
     const PlanRequest& request;
     Lattice box;
-    double error, phi;
+    double error, meanPhi, phi, extent;
 };
 
 void checkRequest(const PlanRequest& r) {
@@ -177,9 +206,19 @@ void checkPlan(const Plan& plan) {
         if (!message.str().empty())
             throw std::invalid_argument(message.str());
     }
+    if (plan.realCutoff < 2*plan.a) {
+        message << "real-space cutoff " << plan.realCutoff << " nm is below the distance of two touching particles, "
+                << 2*plan.a << " nm; leave the cutoff 0 for the automatic one";
+        throw std::invalid_argument(message.str());
+    }
+    if (!(plan.windowShape <= LARGEST_SHAPE)) {
+        message << "window shape " << plan.windowShape << " is above " << LARGEST_SHAPE
+                << "; leave windowShape 0 for the automatic one";
+        throw std::invalid_argument(message.str());
+    }
     if (plan.windowShape < Window::minShape(plan.windowSupport)) {
         message << "window shape " << plan.windowShape << " is below " << Window::minShape(plan.windowSupport)
-                << " (1.57 support), where the window's transform has zeros; leave windowShape 0 for the automatic one";
+                << " (1.57 support), where the window's transform may have zeros; leave windowShape 0 for the automatic one";
         throw std::invalid_argument(message.str());
     }
 }
@@ -254,10 +293,29 @@ Plan makePlan(const PlanRequest& request) {
     return best;
 }
 
+namespace {
+
+/**
+ * Quadrature over theta in [-pi, pi], symmetric, with nodes crowded at 0, where the wave factor of a large box is
+ * peaked and plain Gauss-Legendre nodes are too far apart.
+ */
+Quadrature gradedBand(int nodes) {
+    constexpr double CUBIC = 0.85;
+    Quadrature rule = gaussLegendre(nodes, -1, 1);
+    for (int i = 0; i < nodes; i++) {
+        const double s = rule.nodes[i];
+        rule.nodes[i] = M_PI*s*(1 - CUBIC + CUBIC*s*s);
+        rule.weights[i] *= M_PI*(1 - CUBIC + 3*CUBIC*s*s);
+    }
+    return rule;
+}
+
+} // namespace
+
 double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid, int windowSupport,
-                 double windowShape, double phi) {
+                 double windowShape, double phi, double extent) {
     constexpr int NODES = 24;
-    const Quadrature rule = gaussLegendre(NODES, -M_PI, M_PI);
+    const Quadrature rule = gradedBand(NODES);
     const Window window(windowSupport, windowShape);
     std::vector<double> aliasing(NODES), neighbour(NODES);
     for (int i = 0; i < NODES; i++) {
@@ -271,7 +329,9 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
         nyquist = std::min(nyquist, M_PI*effectivePoints(grid[d])/box.length(d));
     }
     const double measure = double(grid[0])*grid[1]*grid[2]/box.volume()/(8*M_PI*M_PI*M_PI);
-    const double damping = std::pow(box.volume()/(8*M_PI*inverseFourthPowers(box)), 2);
+    // Stands for the missing mode k = 0 and, in pairs, for those that the extent makes useless. The self mobility goes
+    // without: that part is then on the safe side in small boxes.
+    const double damping = std::pow(std::max(box.volume()/(8*M_PI*inverseFourthPowers(box)), 3.751/extent), 2);
     const double density = 3*phi/(4*M_PI);
     double pairs = 0, bias = 0;
     Matrix3 ripple = Matrix3::Zero(); // (direction of the ripple, component of the force)
@@ -280,15 +340,15 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
             for (int l = 0; l < NODES; l++) {
                 const Vec3 k = waves*Vec3(rule.nodes[i], rule.nodes[j], rule.nodes[l]);
                 const double k2 = k.squaredNorm();
-                const double b = 6*M_PI*split.waveWeight(std::sqrt(k2))/(k2 + damping);
+                const double full = 6*M_PI*split.waveWeight(std::sqrt(k2))/k2, b = full*k2/(k2 + damping);
                 const double weight = 2*measure*rule.weights[i]*rule.weights[j]*rule.weights[l];
                 const double all = (1 + aliasing[i])*(1 + aliasing[j])*(1 + aliasing[l]) - 1;
                 pairs += weight*b*b*all*(2 + all); // (1 + all)^2 - 1 without cancellation
-                bias += weight*b*all;
+                bias += weight*full*all;
                 const int node[3] = {i, j, l}, mirror[3] = {NODES - 1 - i, NODES - 1 - j, NODES - 1 - l};
                 const Vec3 transverse = Vec3::Ones() - k.cwiseProduct(k)/k2;
                 for (int d = 0; d < 3; d++)
-                    ripple.row(d) += 0.5*weight*b*(neighbour[node[d]] + neighbour[mirror[d]])*transverse.transpose();
+                    ripple.row(d) += 0.5*weight*full*(neighbour[node[d]] + neighbour[mirror[d]])*transverse.transpose();
             }
     // A particle at x feels a ripple 4 R_d cos(2 pi x_d/h_d) in its self mobility: mean square 8 R_d^2.
     const double self = 8*ripple.squaredNorm()/3 + std::pow(2*bias/3, 2);

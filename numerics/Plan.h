@@ -7,6 +7,7 @@
 #include "numerics/Lattice.h"
 #include "numerics/Split.h"
 #include <array>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -66,10 +67,11 @@ int nextFftSize(int n);
 /**
  * Root mean square error of the wave half on a grid, for unit random forces at volume fraction phi, in 1/(6 pi eta a):
  * aliases of the window in pairs and in the self mobility, and the modes beyond Nyquist [T14].
- * @param box   in radii
+ * @param box     in radii
+ * @param extent  pairs farther apart (in radii) are left out of the estimate; default: none
  */
 double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid, int windowSupport,
-                 double windowShape, double phi);
+                 double windowShape, double phi, double extent = std::numeric_limits<double>::infinity());
 
 } // namespace PSE::numerics
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/RealTable.h"
+#include <algorithm>
 #include <cmath>
 
 namespace PSE::numerics {

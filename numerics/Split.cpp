@@ -118,26 +118,26 @@ void Split::prepareTails() {
     coherentTail = integralsToInfinity(coherent, tailDistance(1) - tailDistance(0));
 }
 
-double Split::realTruncation(double rc, double phi) const {
-    const double density = 3*phi/(4*M_PI);
+double Split::realTruncation(double rc, double phi, double meanPhi) const {
     const double position = (rc - CONTACT)/(largestDistance - CONTACT)*(TAIL_POINTS - 1);
-    const double alike = density*logarithmicMean(coherentTail, position);
-    return std::sqrt(density*logarithmicMean(randomTail, position) + alike*alike);
+    const double random = 3*phi/(4*M_PI)*logarithmicMean(randomTail, position);
+    const double alike = 3*meanPhi/(4*M_PI)*logarithmicMean(coherentTail, position);
+    return std::sqrt(random + alike*alike);
 }
 
-double Split::realCutoff(double error, double phi) const {
-    if (realTruncation(CONTACT, phi) <= error)
+double Split::realCutoff(double error, double phi, double meanPhi) const {
+    if (realTruncation(CONTACT, phi, meanPhi) <= error)
         return CONTACT;
     double low = CONTACT, high = largestDistance;
     while (high - low > 1e-5*high) {
         const double mid = 0.5*(low + high);
-        (realTruncation(mid, phi) > error ? low : high) = mid;
+        (realTruncation(mid, phi, meanPhi) > error ? low : high) = mid;
     }
     return high;
 }
 
 HasimotoSplit::HasimotoSplit(double xi) : xi(xi) {
-    // exp(-k^2/4xi^2) is 4e-19 at k = 13 xi; the real part decays as exp(-xi^2 (r - 2)^2).
+    // exp(-k^2/4xi^2) is 4e-19 at k = 13 xi; the real part of separate spheres decays as exp(-xi^2 (r - 2)^2).
     prepare(13*xi, CONTACT + 8/xi);
 }
 

@@ -38,7 +38,7 @@ public:
     PairScalars realScalars(double r) const;
     /** Real part of the self mobility, 1 - F_W(0) [T7]. */
     double realSelf() const { return 1 - waveScalars(0).F; }
-    /** Largest distance the quadrature resolves; the real part is below 1e-14 there. */
+    /** Largest distance the quadrature resolves; the real part is below its error there. */
     double maxDistance() const { return largestDistance; }
 
     /**
@@ -49,12 +49,16 @@ public:
     /** Smallest wave number above which waveTruncation() is at most error. */
     double waveCutoff(double error, double phi) const;
     /**
-     * Error of M f, for unit forces at volume fraction phi, caused by dropping all pairs beyond rc [T13]: the root mean square
-     * for random forces, and what adds up if all forces are alike.
+     * Error of M f, for unit forces, caused by dropping all pairs beyond rc [T13]: the root mean square for random forces, and
+     * what adds up if all forces are alike.
+     * @param phi      volume fraction around a particle
+     * @param meanPhi  that of the whole box: like forces in a dense cluster add up in M f itself, too
      */
-    double realTruncation(double rc, double phi) const;
+    double realTruncation(double rc, double phi, double meanPhi) const;
+    double realTruncation(double rc, double phi) const { return realTruncation(rc, phi, phi); }
     /** Smallest distance (>= 2, beyond overlap) above which realTruncation() is at most error. */
-    double realCutoff(double error, double phi) const;
+    double realCutoff(double error, double phi, double meanPhi) const;
+    double realCutoff(double error, double phi) const { return realCutoff(error, phi, phi); }
 
 protected:
     /**
@@ -75,7 +79,7 @@ private:
 };
 
 /**
- * The published split, w = sinc^2(k a) (1 + k^2/4xi^2) exp(-k^2/4xi^2) [T8] (Hasimoto 1959; seed paper eq. (9)).
+ * The published split, w = sinc^2(k a) (1 + k^2/4xi^2) exp(-k^2/4xi^2) [T8] (Hasimoto 1959; Fiore et al. 2017, eq. (9)).
  */
 class HasimotoSplit : public Split {
 public:

@@ -18,7 +18,7 @@ class Window {
 public:
     /**
      * @param support  P, grid points touched per axis, >= 2
-     * @param shape    beta; at least minShape(support), else the transform has zeros inside the Nyquist band
+     * @param shape    beta; at least minShape(support), else the transform may have zeros inside the Nyquist band
      */
     Window(int support, double shape) : P(support), beta(shape) {}
     static double minShape(int support) { return 1.57*support; }

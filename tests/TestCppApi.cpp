@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// The public C++ API as a C++ program uses it, on each platform: plugins loaded by OpenMM, not linked.
+#include "OpenMM.h"
+#include "openmmpse/PSEBrownianIntegrator.h"
+#include <cmath>
+#include <cstdlib>
+#include <gtest/gtest.h>
+#include <sstream>
+
+using namespace OpenMM;
+using PSE::PSEBrownianIntegrator;
+using std::string;
+using std::vector;
+
+namespace {
+
+constexpr double ETA = 600, RADIUS = 1, BOX = 10;
+
+class CppApi : public testing::TestWithParam<const char*> {
+protected:
+    static void SetUpTestSuite() {
+        const char* folders = std::getenv("OPENMM_PLUGIN_DIR"); // separated by ':', as OpenMM's Python layer reads it
+        ASSERT_NE(folders, nullptr) << "set OPENMM_PLUGIN_DIR to the folders of OpenMM's plugins and of ours";
+        std::istringstream list(folders);
+        for (string folder; std::getline(list, folder, ':');)
+            Platform::loadPluginsFromDirectory(folder);
+    }
+    Platform& platform() const { return Platform::getPlatformByName(GetParam()); }
+};
+
+System cubicSystem(int numParticles) {
+    System system;
+    system.setDefaultPeriodicBoxVectors(Vec3(BOX, 0, 0), Vec3(0, BOX, 0), Vec3(0, 0, BOX));
+    for (int i = 0; i < numParticles; i++)
+        system.addParticle(1.0);
+    return system;
+}
+
+/** Mobility of one particle in a cube, in units of 1/(6 pi eta a): exact for RPY. */
+double exactSelfMobility() {
+    const double c = RADIUS/BOX;
+    return 1 - 2.8372974794806*c + 4*M_PI/3*c*c*c;
+}
+
+} // namespace
+
+TEST_P(CppApi, OneParticleInACubeHasTheExactMobility) {
+    System system = cubicSystem(1);
+    PSEBrownianIntegrator integrator(300, ETA, RADIUS, 0.1);
+    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    integrator.setErrorTolerance(1e-6);
+    Context context(system, integrator, platform());
+    context.setPositions({Vec3(1.2, 3.4, 5.6)});
+    const vector<Vec3> u = integrator.applyMobility({Vec3(0, 0, 2)});
+    EXPECT_NEAR(u[0][2]*6*M_PI*ETA*RADIUS/2, exactSelfMobility(), 1e-6);
+    EXPECT_NEAR(u[0][0]*6*M_PI*ETA*RADIUS/2, 0, 1e-6);
+}
+
+TEST_P(CppApi, AStepWithoutNoiseIsTheMobilityTimesTheForce) {
+    System system = cubicSystem(1);
+    CustomExternalForce* gravity = new CustomExternalForce("-3*x");
+    gravity->addParticle(0);
+    system.addForce(gravity);
+    PSEBrownianIntegrator integrator(0, ETA, RADIUS, 0.5);
+    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    Context context(system, integrator, platform());
+    context.setPositions({Vec3(1, 2, 3)});
+    const Vec3 u = integrator.applyMobility({Vec3(3, 0, 0)})[0];
+    integrator.step(1);
+    const State state = context.getState(State::Positions | State::Velocities);
+    for (int d = 0; d < 3; d++) {
+        EXPECT_NEAR(state.getPositions()[0][d], Vec3(1, 2, 3)[d] + 0.5*u[d], 1e-15);
+        EXPECT_DOUBLE_EQ(state.getVelocities()[0][d], u[d]);
+    }
+    EXPECT_DOUBLE_EQ(state.getTime(), 0.5);
+}
+
+TEST_P(CppApi, ParametersReproduceAPlan) {
+    System system = cubicSystem(5);
+    PSEBrownianIntegrator first(300, ETA, RADIUS, 0.1);
+    first.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    first.setRandomNumberSeed(3);
+    Context context(system, first, platform());
+    vector<Vec3> positions;
+    for (int i = 0; i < 5; i++)
+        positions.push_back(Vec3(i, 0.5*i, 9 - i));
+    context.setPositions(positions);
+    const PSE::NumericalParameters used = first.getNumericalParameters();
+    PSEBrownianIntegrator second(300, ETA, RADIUS, 0.1);
+    second.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    second.setNumericalParameters(used);
+    Context again(system, second, platform());
+    again.setPositions(positions);
+    first.step(3);
+    second.step(3);
+    const State a = context.getState(State::Positions), b = again.getState(State::Positions);
+    for (int i = 0; i < 5; i++)
+        for (int d = 0; d < 3; d++) {
+            EXPECT_EQ(a.getPositions()[i][d], b.getPositions()[i][d]);
+            EXPECT_NE(a.getPositions()[i][d], positions[i][d]);
+        }
+    EXPECT_GT(first.getNumericalParameters().lanczosIterations, 0);
+    EXPECT_LE(used.predictedError, 1e-3);
+}
+
+TEST_P(CppApi, SettingsAreFixedWhileAContextExists) {
+    System system = cubicSystem(1);
+    PSEBrownianIntegrator integrator(300, ETA, RADIUS, 0.1);
+    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    {
+        Context context(system, integrator, platform());
+        EXPECT_THROW(integrator.setErrorTolerance(1e-4), OpenMMException);
+        EXPECT_EQ(integrator.getErrorTolerance(), 1e-3);
+        integrator.setTemperature(0); // takes effect at the next step
+    }
+    integrator.setErrorTolerance(1e-4);
+    EXPECT_EQ(integrator.getErrorTolerance(), 1e-4);
+    EXPECT_THROW(integrator.step(1), OpenMMException);
+}
+
+TEST_P(CppApi, RefusalNamesTheSetter) {
+    System system = cubicSystem(2);
+    PSEBrownianIntegrator integrator(300, ETA, RADIUS, 0.1);
+    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    integrator.setParticleRadius(1, 2.0);
+    try {
+        Context context(system, integrator, platform());
+        FAIL() << "unequal radii were accepted";
+    }
+    catch (const OpenMMException& refusal) {
+        EXPECT_NE(string(refusal.what()).find("setParticleRadius"), string::npos) << refusal.what();
+    }
+    integrator.setParticleRadius(1, RADIUS); // the same integrator can be put right
+    Context context(system, integrator, platform());
+}
+
+INSTANTIATE_TEST_SUITE_P(Platforms, CppApi, testing::Values("Reference", "CPU"),
+                         [](const testing::TestParamInfo<const char*>& info) { return string(info.param); });
