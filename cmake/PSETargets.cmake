@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 # One function per kind of target. A wheel shares the folder OpenMM.libs with OpenMM's own, so that
 # `import openmm` loads our plugins together with its own.
-include(GNUInstallDirs)
 set(PSE_LIBRARY_DIR OpenMM.libs/lib)
 set(PSE_PLUGIN_OUTPUT_DIR ${CMAKE_BINARY_DIR}/plugins)
 
@@ -73,7 +72,8 @@ function(pse_plugin target folder)
         LIBRARY_OUTPUT_DIRECTORY ${PSE_PLUGIN_OUTPUT_DIR} INSTALL_RPATH "$ORIGIN:$ORIGIN/..")
     # Highway compiles a file once per instruction set by including it
     target_include_directories(${target} PRIVATE ${folder})
-    target_link_options(${target} PRIVATE -Wl,--version-script=${exports})
+    # The API library comes along even if no kernel calls it: it registers the XML proxy.
+    target_link_options(${target} PRIVATE -Wl,--version-script=${exports} -Wl,--no-as-needed)
     target_link_libraries(${target} PRIVATE psehost ${ARGN})
     install(TARGETS ${target} LIBRARY DESTINATION ${PSE_LIBRARY_DIR}/plugins)
 endfunction()

@@ -421,7 +421,8 @@ TEST(Plan, WindowFollowsTheRule) {
         EXPECT_DOUBLE_EQ(plan.windowShape,
                          std::max(std::log(10/error), 1.57*plan.windowSupport));
         EXPECT_LT(plan.tableError, 0.1*error);
-        EXPECT_LE(plan.split->realTruncation(plan.realCutoff, 0.3), error*(1 + 1e-9));
+        const double meanPhi = 200*4.0/3*M_PI/CUBE.volume();
+        EXPECT_LE(plan.split->realTruncation(plan.realCutoff, 0.3, meanPhi), error*(1 + 1e-9));
     }
 }
 
@@ -460,7 +461,7 @@ TEST(Plan, OverridesAreRespectedExactly) {
     EXPECT_EQ(plan.split->name(), "Hasimoto");
     EXPECT_NEAR(plan.split->waveWeight(1.3), HasimotoSplit(0.4321).waveWeight(1.3), 1e-15);
     const double wave = waveError(*plan.split, CUBE, plan.grid, 6, 12.34, 0.3),
-                 real = plan.split->realTruncation(7.654, 0.3);
+                 real = plan.split->realTruncation(7.654, 0.3, 100*4.0/3*M_PI/CUBE.volume());
     EXPECT_GT(plan.predictedError,
               0.5*std::hypot(wave, real)); // the Plan may know that pairs are not that far apart
     EXPECT_LT(plan.predictedError, 1.001*std::hypot(wave, real));

@@ -49,19 +49,19 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
 class OPENMM_EXPORT_PSE PSEBrownianIntegrator : public OpenMM::Integrator {
 public:
     /** The mobility M. */
-    enum MobilityModel {
+    enum MobilityModel : int {
         RotnePragerYamakawa = 0, ///< rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
         ForceCoupling = 1,       ///< Gaussian envelopes, sigma = a/sqrt(pi)
         FreeDraining = 2         ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
     };
     /** What surrounds the particles. */
-    enum FluidBoundary {
+    enum FluidBoundary : int {
         Automatic = 0, ///< periodic if any Force uses periodic boundary conditions, else unbounded
         Periodic = 1,  ///< periodic in the box of the Context, zero mean flow
         Unbounded = 2  ///< infinite solvent
     };
     /** How M is divided into a real-space and a wave-space half. */
-    enum Split {
+    enum Split : int {
         AutomaticSplit = 0,
         Prolate = 1,
         Hasimoto = 2

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+// The Python face of PSEBrownianIntegrator: the C++ header as it is, with units checked on the way
+// in, Quantities on the way out, NumPy arrays for vectors and dicts for numerical parameters.
+// step() is not wrapped here: the one inherited from openmm.Integrator dispatches virtually and
+// releases the GIL.
+%module(package="openmmpse") binding
+
+%include "factory.i"
+%import(module="openmm") "swig/OpenMMSwigHeaders.i"
+%include "swig/typemaps.i"
+%include <std_string.i>
+
+%{
+#include "bindingSupport.h"
+#include "OpenMM.h"
+#include "OpenMMAmoeba.h"
+#include "OpenMMDrude.h"
+#include "openmm/RPMDIntegrator.h"
+#include "openmm/RPMDMonteCarloBarostat.h"
+#include "openmm/RPMDUpdater.h"
+using namespace OpenMM;
+using namespace PSE::binding;
+%}
+
+%pythoncode %{
+import numpy
+from openmm import unit
+from openmmpse.conversion import (
+    VISCOSITY_UNIT, arrayOfForces, inUnit, integer, numericalParameterArguments)
+%}
+
+// ---- exceptions of C++ become openmm.OpenMMException ----
+
+%exception {
+    try {
+        $action
+    } catch (const std::exception& error) {
+        raiseOpenMMException(error);
+        SWIG_fail;
+    }
+}
+%define PSE_WITHOUT_GIL(METHOD)
+%exception PSE::PSEBrownianIntegrator::METHOD {
+    try {
+        WithoutGil released;
+        $action
+    } catch (const std::exception& error) {
+        raiseOpenMMException(error);
+        SWIG_fail;
+    }
+}
+%enddef
+PSE_WITHOUT_GIL(applyMobility)
+PSE_WITHOUT_GIL(sampleBrownianDisplacements)
+
+// ---- structures ----
+
+%typemap(out) PSE::NumericalParameters, std::map<int, double> { $result = toDict($1); }
+%typemap(out) const PSE::NumericalParameters&, const std::map<int, double>& {
+    $result = toDict(*$1);
+}
+%typemap(in) const PSE::NumericalParameters& (PSE::NumericalParameters parameters) {
+    const char* split;
+    int* grid = parameters.gridDimensions;
+    if (!PyArg_ParseTuple($input, "sdd(iii)iddi", &split, &parameters.xi, &parameters.realCutoff,
+            &grid[0], &grid[1], &grid[2], &parameters.windowSupport, &parameters.windowShape,
+            &parameters.lanczosTolerance, &parameters.randomSeed))
+        SWIG_fail;
+    parameters.split = split;
+    $1 = &parameters;
+}
+%typemap(out) std::vector<OpenMM::Vec3> { $result = toBytes($1); }
+%typemap(in) const std::vector<OpenMM::Vec3>& (std::vector<OpenMM::Vec3> vectors) {
+    try {
+        vectors = toVectors($input);
+    } catch (const std::exception& error) {
+        raiseOpenMMException(error);
+        SWIG_fail;
+    }
+    $1 = &vectors;
+}
+%apply int& OUTPUT { int& nx, int& ny, int& nz };
+
+// ---- units and array shapes ----
+
+%define PSE_QUANTITY(GETTER, SETTER, ARGUMENT, UNIT)
+%feature("pythonappend") PSE::PSEBrownianIntegrator::GETTER %{
+    val = unit.Quantity(val, UNIT)
+%}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::SETTER %{
+    ARGUMENT = inUnit(ARGUMENT, UNIT, "ARGUMENT")
+%}
+%enddef
+PSE_QUANTITY(getTemperature, setTemperature, temperature, unit.kelvin)
+PSE_QUANTITY(getViscosity, setViscosity, viscosity, VISCOSITY_UNIT)
+PSE_QUANTITY(getRadius, setRadius, radius, unit.nanometer)
+PSE_QUANTITY(getShearRate, setShearRate, rate, unit.picosecond**-1)
+PSE_QUANTITY(getSplittingParameter, setSplittingParameter, xi, unit.nanometer**-1)
+PSE_QUANTITY(getStepSize, setStepSize, size, unit.picosecond)
+
+%define PSE_NUMBER(SETTER, ARGUMENT, CONVERSION)
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::SETTER %{
+    ARGUMENT = CONVERSION
+%}
+%enddef
+PSE_NUMBER(setErrorTolerance, tolerance, inUnit(tolerance, unit.dimensionless, "tolerance"))
+PSE_NUMBER(setMobilityModel, model, integer(model, "model"))
+PSE_NUMBER(setFluidBoundary, boundary, integer(boundary, "boundary"))
+PSE_NUMBER(setSplit, split, integer(split, "split"))
+PSE_NUMBER(setWindowSupport, support, integer(support, "support"))
+PSE_NUMBER(setRandomNumberSeed, seed, integer(seed, "seed"))
+PSE_NUMBER(setNumericalParameters, parameters, numericalParameterArguments(parameters))
+PSE_NUMBER(applyMobility, forces, arrayOfForces(forces, self._particleCount()))
+PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
+
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::PSEBrownianIntegrator %{
+    temperature = inUnit(temperature, unit.kelvin, "temperature")
+    viscosity = inUnit(viscosity, VISCOSITY_UNIT, "viscosity")
+    radius = inUnit(radius, unit.nanometer, "radius")
+    stepSize = inUnit(stepSize, unit.picosecond, "stepSize")
+%}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::getParticleRadius %{
+    index = integer(index, "index")
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::getParticleRadius %{
+    val = unit.Quantity(val, unit.nanometer)
+%}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::setParticleRadius %{
+    index = integer(index, "index")
+    radius = inUnit(radius, unit.nanometer, "radius")
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::getParticleRadii %{
+    val = {index: unit.Quantity(radius, unit.nanometer) for index, radius in val.items()}
+%}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::setGridDimensions %{
+    nx, ny, nz = integer(nx, "nx"), integer(ny, "ny"), integer(nz, "nz")
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::getGridDimensions %{
+    val = tuple(val)
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::applyMobility %{
+    val = numpy.frombuffer(bytearray(val)).reshape(-1, 3)  # a bytearray: writable
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::sampleBrownianDisplacements %{
+    val = numpy.frombuffer(bytearray(val)).reshape(count, self._particleCount(), 3)
+%}
+
+%include "docstrings.i"
+
+// ---- the class itself ----
+
+#define OPENMM_EXPORT_PSE
+%ignore PSE::NumericalParameters;
+%ignore PSE::PSEBrownianIntegrator::step;
+%feature("notabstract") PSE::PSEBrownianIntegrator;
+%include "openmmpse/PSEBrownianIntegrator.h"
+
+%extend PSE::PSEBrownianIntegrator {
+    int _particleCount() { return particleCount(*$self); }
+    static bool isinstance(OpenMM::Integrator& integrator) {
+        return dynamic_cast<PSE::PSEBrownianIntegrator*>(&integrator) != nullptr;
+    }
+    static PSE::PSEBrownianIntegrator& _downcast(OpenMM::Integrator& integrator) {
+        auto* derived = dynamic_cast<PSE::PSEBrownianIntegrator*>(&integrator);
+        if (derived == nullptr)
+            throw OpenMMException("PSEBrownianIntegrator.cast() was given another Integrator; "
+                                  "ask isinstance() first");
+        return *derived;
+    }
+%pythoncode %{
+    @staticmethod
+    def cast(integrator):
+        """Get an openmm.Integrator that is a PSEBrownianIntegrator in C++ as one in Python.
+
+        XmlSerializer.deserialize() and CompoundIntegrator.getIntegrator() return plain Integrators.
+
+        Raises
+        ------
+        openmm.OpenMMException
+            if it is another kind of Integrator
+        """
+        if isinstance(integrator, PSEBrownianIntegrator):
+            return integrator
+        val = PSEBrownianIntegrator._downcast(integrator)
+        if integrator.thisown:
+            val.thisown, integrator.thisown = True, False
+            integrator._cast = val  # keeps the C++ object alive for both
+        else:
+            val._source = integrator
+        return val
+
+    # OpenMM's copies and pickles hold a pointer to the base class, which no method here accepts.
+    def _retyped(self):
+        val = PSEBrownianIntegrator._downcast(self)
+        val.thisown, self.thisown = True, False
+        self.this = val.this
+        return self
+
+    def __copy__(self):
+        return super().__copy__()._retyped()
+
+    def __setstate__(self, state):
+        super().__setstate__(state)
+        self._retyped()
+%}
+}

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""Brownian dynamics with hydrodynamic interactions for OpenMM, by Positively Split Ewald.
+
+PSEBrownianIntegrator takes the place of openmm.BrownianIntegrator: see its documentation.
+`python -m openmmpse doctor` checks an installation, `python -m openmmpse demo` shows what it does.
+"""
+
+from importlib.metadata import version as _version
+
+import openmm as _openmm
+
+__version__ = _version("openmm-pse")
+
+if not _openmm.Platform.getOpenMMVersion().startswith("8.6."):
+    raise ImportError(
+        f"openmmpse {__version__} is built for OpenMM 8.6, but OpenMM "
+        f"{_openmm.Platform.getOpenMMVersion()} is installed; "
+        "install the one it needs with: pip install 'openmm>=8.6.1,<8.7'"
+    )
+
+from openmmpse.binding import PSEBrownianIntegrator
+from openmmpse.plugins import loadMissing as _loadMissing
+
+PSEBrownianIntegrator.__module__ = __name__
+_loadMissing()
+
+__all__ = ["PSEBrownianIntegrator"]

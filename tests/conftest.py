@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+"""Runs every test with an argument `platformName` on each platform; --platform chooses."""
+
+PLATFORMS = ("Reference", "CPU")
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--platform",
+        action="append",
+        choices=PLATFORMS,
+        help="run the tests on this platform only (may be repeated); default: all",
+    )
+
+
+def pytest_generate_tests(metafunc):
+    if "platformName" in metafunc.fixturenames:
+        metafunc.parametrize(
+            "platformName", metafunc.config.getoption("platform") or PLATFORMS, scope="session"
+        )

@@ -1,0 +1,405 @@
+# SPDX-License-Identifier: MIT
+"""
+applyMobility against the dense oracle: the contract of setErrorTolerance(), which is
+
+    |u - M f| <= tolerance * max(|M f|, |f|/(6 pi eta a))          random, uniform, balanced forces
+    largest singular value of (M' - M) <= 3 tolerance/(6 pi eta a)  the worst force there is
+
+and what must hold whatever the tolerance: symmetry, positivity, invariances, and that the numerical
+parameters move cost and not results.
+"""
+import functools
+
+import numpy as np
+import openmm
+import pytest
+
+from openmmpse import PSEBrownianIntegrator
+import scenes
+from scenes import (Scene, errorOf, errorRatio, forceKinds, makeContext, mobilityColumns,
+                    positionsOf, randomForces)
+
+# The Reference platform sums over wave vectors directly; its scenes are small.
+SINGLE = [1e-2, 1e-3, 1e-4, 1e-5]
+TOLERANCES = {"Reference": [1e-2, 1e-3, 1e-5, 1e-10], "CPU": SINGLE + [1e-6, 1e-8]}
+# Rounding of the arrays in use, relative to 1/(6 pi eta a): what exact identities may lose.
+ROUNDING = {"single": 5e-6, "double": 1e-11}
+PARAMETER_KEYS = {
+    "split", "xi", "realCutoff", "gridDimensions", "windowSupport", "windowShape",
+    "lanczosTolerance", "lanczosIterations", "predictedError", "precision", "randomSeed"}
+
+
+def outsideTheBox(scene, seed=21):
+    """The same scene with every particle moved by lattice vectors, some of them far."""
+    rng = np.random.default_rng(seed)
+    shifts = rng.integers(-3, 4, (scene.count, 3))
+    shifts[0] = [200, -300, 100]
+    return scene.moved(shifts @ scene.box)
+
+
+def randomPoints(N, seed):
+    return np.random.default_rng(seed).random((N, 3))
+
+
+# name -> function of the number of particles that the platform affords
+SCENES = {
+    "oneInCube": lambda N: Scene(np.array([[0.3, 1.7, 2.9]]), scenes.cube(5.0), 0.5),
+    "oneInTinyCube": lambda N: Scene(np.array([[0.3, 0.7, 0.9]]), scenes.cube(1.1), 0.5),
+    "touchingPair": lambda N: scenes.pair(1.4, 9.0, 0.7),
+    "overlappingPair": lambda N: scenes.pair(0.35, 9.0, 0.7),
+    "coincidentPair": lambda N: scenes.pair(0.0, 7.0, 0.7),
+    "sixInTinyCube": lambda N: Scene(randomPoints(6, 30), scenes.cube(1.0), 0.5),
+    "pairInSmallCube": lambda N: scenes.pair(0.6, 1.6, 0.5),
+    "three": lambda N: scenes.idealGas(3, 0.05, scenes.cube(1), 0.5, 31),
+    "suspension10": lambda N: scenes.randomSuspension(N, 0.1, scenes.cube(1), 0.5, 32),
+    "suspension45": lambda N: scenes.denseSuspension(3 if N > 60 else 2, 0.45, 0.5, 33),
+    "idealGas": lambda N: scenes.idealGas(N, 0.2, scenes.cube(1), 0.5, 34),
+    "chain": lambda N: scenes.chain(min(N, 100), 1.6, 24.0*(min(N, 100)/100)**0.5, 0.8, 35),
+    "maximalTilt": lambda N: scenes.randomSuspension(N, 0.1, scenes.tilted(1), 0.5, 36),
+    "negativeTilt": lambda N: scenes.randomSuspension(N, 0.2, scenes.tilted(1, -1), 0.5, 37),
+    "elongated": lambda N: scenes.randomSuspension(N, 0.1, scenes.elongated(1), 0.5, 38),
+    "rhombicDodecahedron":
+        lambda N: scenes.randomSuspension(N, 0.1, scenes.rhombicDodecahedron(1), 0.5, 39),
+    "truncatedOctahedron":
+        lambda N: scenes.randomSuspension(N, 0.1, scenes.truncatedOctahedron(1), 0.5, 40),
+    "outsideTheBox":
+        lambda N: outsideTheBox(scenes.randomSuspension(N, 0.1, scenes.tilted(1), 0.5, 41)),
+}
+
+
+@functools.lru_cache(maxsize=None)
+def scene(name, size):
+    return SCENES[name](size)
+
+
+def sceneFor(name, platformName):
+    return scene(name, 40 if platformName == "Reference" else 160)
+
+
+def smallScene(seed=51, N=12, phi=0.15, box=scenes.cube(1)):
+    return scenes.randomSuspension(N, phi, box, 0.5, seed)
+
+
+def rounding(integrator):
+    return ROUNDING[integrator.getNumericalParameters()["precision"]]
+
+
+# ---------------------------------------------------------------- the contract
+
+@pytest.mark.parametrize("name", SCENES)
+def testErrorContract(platformName, name):
+    s = sceneFor(name, platformName)
+    failures = []
+    for tolerance in TOLERANCES[platformName]:
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        for kind, forces in forceKinds(s).items():
+            ratio = errorOf(integrator, forces, s)/tolerance
+            if not ratio <= 1:
+                failures.append(f"{kind} forces at {tolerance:g}: error {ratio:.2f} tolerance")
+    assert not failures, "; ".join(failures)
+
+
+@pytest.mark.parametrize("name", ["oneInCube", "overlappingPair", "suspension10", "maximalTilt",
+                                  "elongated"])
+def testParametersReported(platformName, name):
+    s = sceneFor(name, platformName)
+    for tolerance in TOLERANCES[platformName]:
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        parameters = integrator.getNumericalParameters()
+        assert PARAMETER_KEYS <= set(parameters)
+        assert 0 < parameters["predictedError"] <= tolerance
+        assert parameters["split"] == "Hasimoto"
+        assert parameters["xi"] > 0 and parameters["realCutoff"] > 0
+        assert len(parameters["gridDimensions"]) == 3
+        assert min(parameters["gridDimensions"]) >= parameters["windowSupport"] >= 3
+        assert parameters["randomSeed"] == 5
+        double = platformName == "Reference" or tolerance < 0.99e-5
+        assert parameters["precision"] == ("double" if double else "single")
+
+
+@pytest.mark.parametrize("box", ["cube", "tilted", "elongated"])
+def testWorstForce(platformName, box):
+    """The whole error matrix; no force can find more than its largest singular value."""
+    shapes = {"cube": scenes.cube, "tilted": scenes.tilted, "elongated": scenes.elongated}
+    s = smallScene(52, 16, 0.15, shapes[box](1))
+    failures = []
+    for tolerance in TOLERANCES[platformName]:
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        error = mobilityColumns(integrator, s.count) - s.mobility
+        worst = np.linalg.norm(error, 2)/s.mu0/tolerance
+        if not worst <= 3:
+            failures.append(f"at {tolerance:g}: {worst:.2f} tolerance")
+    assert not failures, "; ".join(failures)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def testSymmetryAndPositivity(platformName, tolerance):
+    """Overlapping, touching and coincident particles included: M' is symmetric and >= 0."""
+    a = 0.5
+    s = scenes.idealGas(10, 0.3, scenes.tilted(1), a, 53)
+    s.positions[1] = s.positions[0]
+    s.positions[3] = s.positions[2] + [0.5*a, 0, 0]
+    s.positions[5] = s.positions[4] + [0, 2*a, 0]
+    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    M = mobilityColumns(integrator, s.count)/s.mu0
+    limit = rounding(integrator)
+    assert np.linalg.norm(M - M.T, 2) < limit
+    eigenvalues = np.linalg.eigvalsh(0.5*(M + M.T))
+    assert abs(eigenvalues[:3]).max() < limit      # the coincident pair: no relative mobility
+    assert eigenvalues[3] > 1e-3
+
+
+# ---------------------------------------------------------------- numerical parameters
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def testSplittingParameterDoesNotMatter(platformName, tolerance):
+    s = scenes.idealGas(30, 0.1, scenes.tilted(1), 0.5, 54)
+    forces = randomForces(s)
+    exact = s.velocities(forces)
+    for xi in (0.6, 1.0, 1.7, 2.6):
+        context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                          configure=lambda i: i.setSplittingParameter(xi))
+        parameters = integrator.getNumericalParameters()
+        assert parameters["xi"] == pytest.approx(xi, rel=1e-12)
+        ratio = errorRatio(integrator.applyMobility(forces), exact, forces, s)/tolerance
+        assert ratio <= 1, f"xi = {xi}: error {ratio:.2f} tolerance, {parameters}"
+
+
+@pytest.mark.parametrize("extra", [(0, 0, 0), (1, 1, 1), (0, 1, 2), (3, 2, 1)])
+def testOddEvenAndUnequalGrids(platformName, extra):
+    """The Plan's own grid made finer by hand: odd, even and mixed numbers of points, primes."""
+    s = smallScene(55, 12, 0.15, scenes.tilted(1))
+    tolerance = 1e-4
+    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    automatic = integrator.getNumericalParameters()
+    grid = [2*((n + 1)//2) + e for n, e in zip(automatic["gridDimensions"], extra)]
+
+    def configure(i):
+        i.setSplittingParameter(automatic["xi"])
+        i.setGridDimensions(*grid)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance, configure=configure)
+    assert list(integrator.getNumericalParameters()["gridDimensions"]) == grid
+    for kind, forces in forceKinds(s).items():
+        ratio = errorOf(integrator, forces, s)/tolerance
+        assert ratio <= 1, f"{kind} forces on grid {grid}: error {ratio:.2f} tolerance"
+
+
+def testWiderWindow(platformName):
+    s = smallScene(56)
+    tolerance = 1e-4
+    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    support = integrator.getNumericalParameters()["windowSupport"] + 1
+    context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                      configure=lambda i: i.setWindowSupport(support))
+    assert integrator.getNumericalParameters()["windowSupport"] == support
+    forces = randomForces(s)
+    assert errorOf(integrator, forces, s) <= tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def testPlanIsReproduced(platformName, tolerance):
+    """The returned dict, given to another integrator: the same dict and velocities, to the bit."""
+    s = smallScene(57, 20, 0.1, scenes.tilted(1))
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance, seed=17,
+                                      configure=lambda i: i.setSplittingParameter(1.3))
+    parameters = integrator.getNumericalParameters()
+    again, copy = makeContext(s, platformName, tolerance=tolerance, seed=0,
+                              configure=lambda i: i.setNumericalParameters(parameters))
+    assert copy.getNumericalParameters() == parameters
+    assert np.array_equal(copy.applyMobility(forces), integrator.applyMobility(forces))
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def testPlatformsAgreeWithTheSamePlan(tolerance):
+    s = smallScene(58, 30, 0.1, scenes.tilted(1))
+    forces = randomForces(s)
+    context, cpu = makeContext(s, "CPU", tolerance=tolerance)
+    parameters = cpu.getNumericalParameters()
+    other, reference = makeContext(s, "Reference", tolerance=tolerance,
+                                   configure=lambda i: i.setNumericalParameters(parameters))
+    # The Reference platform converges its Lanczos iteration to 1e-12 whatever it is told.
+    same = ("split", "xi", "realCutoff", "gridDimensions", "windowSupport", "windowShape")
+    found = reference.getNumericalParameters()
+    assert {key: found[key] for key in same} == {key: parameters[key] for key in same}
+    u = reference.applyMobility(forces)
+    assert errorRatio(cpu.applyMobility(forces), u, forces, s) <= tolerance
+
+
+# ---------------------------------------------------------------- invariances
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
+def testLatticeVectorsDoNotMatter(platformName, tolerance):
+    """
+    The crystal decides, not the vectors that describe it: b and b - a at half tilt span the same
+    one. Moving particles by lattice vectors changes nothing but rounding.
+    """
+    s = smallScene(59, 12, 0.15, scenes.tilted(1))
+    a, b, c = s.box
+    forces = randomForces(s)
+    exact = s.velocities(forces)
+    for other in ([a, b - a, c], [a, b, c - a], [a, b, c - b], [a, b - a, c - b]):
+        same = Scene(s.positions, np.array(other), s.radius)
+        context, integrator = makeContext(same, platformName, tolerance=tolerance)
+        u = integrator.applyMobility(forces)
+        ratio = errorRatio(u, exact, forces, s)/tolerance
+        assert ratio <= 1, f"box {np.array(other).tolist()}: error {ratio:.2f} tolerance"
+        moved = outsideTheBox(same)
+        context.setPositions(moved.positions)
+        assert errorRatio(integrator.applyMobility(forces), u, forces, s) < rounding(integrator)
+
+
+def testPermutedAxes(platformName):
+    """A crystal turned by 120 degrees about 111, box 1:1:8: the velocities turn with it."""
+    tolerance = 1e-4
+    s = smallScene(60, 12, 0.1, scenes.elongated(1))
+    forces = randomForces(s)
+    exact = s.velocities(forces)
+    for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+        turned = Scene(s.positions[:, order], s.box[order][:, order], s.radius)
+        context, integrator = makeContext(turned, platformName, tolerance=tolerance)
+        u = integrator.applyMobility(forces[:, order])
+        assert errorRatio(u, exact[:, order], forces, s) <= tolerance
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def testDoubledBox(platformName, axis):
+    tolerance = 1e-4
+    s = smallScene(61, 8, 0.1)
+    box = s.box.copy()
+    box[axis] *= 2
+    doubled = Scene(np.vstack([s.positions, s.positions + s.box[axis]]), box, s.radius)
+    forces = np.tile(randomForces(s), (2, 1))
+    exact = np.tile(s.velocities(forces[:s.count]), (2, 1))
+    context, integrator = makeContext(doubled, platformName, tolerance=tolerance)
+    assert errorRatio(integrator.applyMobility(forces), exact, forces, s) <= tolerance
+
+
+def testTranslation(platformName):
+    """The grid must not show: 20 random translations of the whole crystal."""
+    tolerance = 1e-3
+    s = smallScene(62, 12, 0.15, scenes.rhombicDodecahedron(1))
+    forces = randomForces(s)
+    exact = s.velocities(forces)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    for shift in np.random.default_rng(63).uniform(-5, 5, (20, 3)):
+        context.setPositions(s.positions + shift)
+        assert errorRatio(integrator.applyMobility(forces), exact, forces, s) <= tolerance
+
+
+def testBoxChangedBetweenSteps(platformName):
+    """Larger, smaller, tilted: velocities and the next step belong to the new box."""
+    tolerance = 1e-4
+    s = smallScene(64, 12, 0.1)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                      forces=[scenes.constantForces(forces)])
+    integrator.step(2)
+    L = s.box[0, 0]
+    for box in (scenes.cube(1.3*L), scenes.cube(0.9*L), scenes.tilted(L),
+                np.diag([L, 1.5*L, 1.1*L])):
+        context.setPositions(s.positions)
+        context.setPeriodicBoxVectors(*box)
+        now = Scene(s.positions, box, s.radius)
+        exact = now.velocities(forces)
+        ratio = errorRatio(integrator.applyMobility(forces), exact, forces, now)/tolerance
+        assert ratio <= 1, f"box {box.tolist()}: error {ratio:.2f} tolerance"
+        integrator.step(1)
+        u = (positionsOf(context) - s.positions)/1.0
+        assert errorRatio(u, exact, forces, now) <= tolerance
+
+
+def testPositionsChangedBetweenCalls(platformName):
+    """applyMobility acts at the current positions, whoever moved them and how far."""
+    tolerance = 1e-4
+    s = smallScene(65, 12, 0.1)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    for scale in (1e-3, 0.1, 3.0):
+        moved = s.moved(np.random.default_rng(66).normal(size=(s.count, 3))*scale)
+        context.setPositions(moved.positions)
+        assert errorOf(integrator, forces, moved) <= tolerance
+
+
+# ---------------------------------------------------------------- who takes part, and how
+
+def testMasslessParticlesAreTransparent(platformName):
+    tolerance = 1e-4
+    s = smallScene(67, 14, 0.15)
+    mobile = np.array([i for i in range(14) if i not in (0, 5, 13)])
+    masses = [1.0 if i in mobile else 0.0 for i in range(14)]
+    context, integrator = makeContext(s, platformName, tolerance=tolerance, masses=masses)
+    forces = randomForces(s)
+    u = integrator.applyMobility(forces)
+    others = Scene(s.positions[mobile], s.box, s.radius)
+    assert not np.any(np.delete(u, mobile, axis=0))
+    exact = others.velocities(forces[mobile])
+    assert errorRatio(u[mobile], exact, forces[mobile], others) <= tolerance
+
+
+def testMassesDoNotMatter(platformName):
+    s = smallScene(68)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName)
+    heavy, other = makeContext(s, platformName, masses=list(np.linspace(1, 1000, s.count)))
+    assert np.array_equal(integrator.applyMobility(forces), other.applyMobility(forces))
+
+
+def testAutomaticBoundaryFollowsTheForces(platformName):
+    """A Force that uses periodic boundary conditions makes the fluid periodic."""
+    s = smallScene(69)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName)
+    dummy = scenes.periodicDummyForce(s.count, s.box)
+    other, automatic = makeContext(s, platformName, forces=[dummy],
+                                   boundary=PSEBrownianIntegrator.Automatic)
+    assert np.array_equal(integrator.applyMobility(forces), automatic.applyMobility(forces))
+    assert "periodic" in automatic.describe().lower()
+
+
+def testFreeDraining(platformName):
+    s = smallScene(70)
+    forces = randomForces(s)
+    context, integrator = makeContext(
+        s, platformName, configure=lambda i: i.setMobilityModel(PSEBrownianIntegrator.FreeDraining))
+    assert np.allclose(integrator.applyMobility(forces), forces*s.mu0, rtol=1e-12, atol=0)
+    parameters = integrator.getNumericalParameters()
+    assert parameters["xi"] == 0 and tuple(parameters["gridDimensions"]) == (0, 0, 0)
+
+
+def testDefaults(platformName):
+    """Tolerance 1e-3 unless told otherwise, and an integrator that nothing was set on works."""
+    s = smallScene(71)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, platformName)
+    assert integrator.getErrorTolerance() == 1e-3
+    assert errorOf(integrator, forces, s) <= 1e-3
+
+
+def testInputAndOutputOfApplyMobility(platformName):
+    """Array-likes in, a new float64 array out; linear; nothing moves and no step is counted."""
+    s = smallScene(72)
+    context, integrator = makeContext(s, platformName, temperature=300.0)
+    forces = randomForces(s)
+    u = integrator.applyMobility(forces)
+    assert isinstance(u, np.ndarray) and u.shape == (s.count, 3) and u.dtype == np.float64
+    assert u.flags.writeable and u.flags.c_contiguous
+    assert np.array_equal(u, integrator.applyMobility(forces.tolist()))
+    assert np.array_equal(u, integrator.applyMobility([openmm.Vec3(*f) for f in forces]))
+    assert np.array_equal(u, integrator.applyMobility(np.asfortranarray(forces)))
+    assert np.array_equal(u, integrator.applyMobility(np.repeat(forces, 2, axis=0)[::2]))
+    assert np.array_equal(integrator.applyMobility(4*forces), 4*u)
+    assert not np.any(integrator.applyMobility(np.zeros_like(forces)))
+    assert np.array_equal(positionsOf(context), s.positions)
+    assert context.getStepCount() == 0 and context.getTime()._value == 0
+
+
+def testThreadsDoNotChangeABit():
+    s = scene("suspension10", 160)
+    forces = randomForces(s)
+    results = []
+    for threads in (1, 2):
+        context, integrator = makeContext(s, "CPU", threads=threads,
+                                          configure=lambda i: i.setSplittingParameter(1.2))
+        results.append(integrator.applyMobility(forces))
+    assert np.array_equal(*results)
