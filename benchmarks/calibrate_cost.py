@@ -50,10 +50,10 @@ def stepTime(integrator, repeats=4):
 
 
 def features(numParticles, phi, parameters):
-    """What each constant of the model multiplies: [SPREAD, FFT, MODE, PAIR_BUILD, PAIR_APPLY]."""
+    """What each constant of the model multiplies: [SPREAD, GRID, PAIR_BUILD, PAIR_APPLY]."""
     points = np.prod(parameters["gridDimensions"], dtype=float)
     pairs = numParticles*phi*parameters["realCutoff"]**3
-    return [numParticles*parameters["windowSupport"]**3, points*np.log2(points), points, pairs,
+    return [numParticles*parameters["windowSupport"]**3, points, pairs,
             pairs*parameters["lanczosIterations"]]
 
 
@@ -77,7 +77,7 @@ def main():
     from scipy.optimize import nnls
     relative = np.array(rows)/np.array(times)[:, None]
     constants, _ = nnls(relative, np.ones(len(times)))
-    print("SPREAD %.2f  FFT %.3f  MODE %.1f  PAIR_BUILD %.1f  PAIR_APPLY %.2f" % tuple(constants))
+    print("SPREAD %.2f  GRID %.1f  PAIR_BUILD %.1f  PAIR_APPLY %.2f" % tuple(constants))
     print("model/measured: %.2f .. %.2f" % ((relative @ constants).min(), (relative @ constants).max()))
     for phi, tolerance, xi, milliseconds, excess in best:
         print(f"phi {phi} tolerance {tolerance}: automatic xi {xi:.3f}, ms per step at 0.6 .. 1.6 of it {milliseconds}, "

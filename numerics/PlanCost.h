@@ -2,22 +2,19 @@
 #ifndef OPENMMPSE_NUMERICS_PLANCOST_H_
 #define OPENMMPSE_NUMERICS_PLANCOST_H_
 
-#include <cmath>
-
 namespace PSE::numerics {
 
 /**
- * Deterministic model of the time of one step (in ns on one thread of an AVX-512 server core): only the ratios matter,
+ * Deterministic model of the time of one step (in ns on one thread of a shared 2.5 GHz server core with AVX-512): only the ratios matter,
  * for the choice of xi. Fitted to stage times by benchmarks/calibrate_cost.py; never measured inside a run, so that
  * the same scene gives the same Plan on every machine.
  */
 struct CostModel {
-    static constexpr double SPREAD = 2.0;    ///< per particle and point of its P^3 window: spread and gather, three components
-    static constexpr double FFT = 0.45;      ///< per grid point and log2(points): six real transforms
-    static constexpr double MODE = 25.0;     ///< per grid point: noise and wave factor, three components
-    static constexpr double DIRECT = 25.0;   ///< per particle and mode of a direct sum, there and back
-    static constexpr double PAIR_BUILD = 8.0; ///< per ordered pair in range: distance and coefficients
-    static constexpr double PAIR_APPLY = 3.0; ///< per ordered pair in range and product with M_R
+    static constexpr double SPREAD = 16;     ///< per particle and point of its P^3 window: spread and gather, three components
+    static constexpr double GRID = 73;       ///< per grid point: six real transforms, noise, wave factor
+    static constexpr double DIRECT = 25;     ///< per particle and mode of a direct sum, there and back
+    static constexpr double PAIR_BUILD = 32; ///< per ordered pair in range: distance and coefficients
+    static constexpr double PAIR_APPLY = 9;  ///< per ordered pair in range and product with M_R
 
     /**
      * @param pairs   ordered pairs (images included) in range
@@ -25,8 +22,7 @@ struct CostModel {
      */
     static double step(double particles, double gridPoints, int windowSupport, double pairs, double products) {
         const double support = windowSupport;
-        return particles*SPREAD*support*support*support + gridPoints*(MODE + FFT*std::log2(gridPoints)) +
-               pairs*(PAIR_BUILD + products*PAIR_APPLY);
+        return particles*SPREAD*support*support*support + gridPoints*GRID + pairs*(PAIR_BUILD + products*PAIR_APPLY);
     }
 
     /** The same for direct sums over the modes of the grid, of which half are independent. */

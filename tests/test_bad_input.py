@@ -336,6 +336,12 @@ def testBoxThatGrowsBeyondMemory():
     assert context.getStepCount() == 2
 
 
+def testBoxThatCannotBeMeant(platformName):
+    """A thousandth of a radius: a mistake of units, not a crystal."""
+    system = makeSystem(scenes.Scene(suspension().positions, scenes.cube(4e-4), 0.5))
+    assertMentions(refusal(platformName, system=system), "box", "radius", "0.0004", "larger")
+
+
 def testGridSmallerThanTheWindow(platformName):
     def configure(i):
         i.setGridDimensions(4, 16, 16)
