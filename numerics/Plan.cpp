@@ -24,8 +24,10 @@ constexpr double SMALL_BOX = 12;            ///< in radii: here sums have few te
 constexpr double SMALL_BOX_SHARE = 0.5;     ///< of the budget, therefore
 constexpr double LARGEST_LIST_RANGE = 0.499; ///< of the box: a neighbour list in single precision needs a margin below 1/2
 /// Radii. What the window does to waves longer than this is a fixed small share of the velocity that they carry, which
-/// the tolerance is relative to: farther pairs do not count.
+/// the tolerance is relative to: farther pairs do not count. Not so in long boxes, where few waves carry most of it.
 constexpr double LARGEST_EXTENT = 12;
+constexpr double LONG_BOX = 2;              ///< longest over shortest box vector
+constexpr double SMALLEST_BOX = 0.1;        ///< in radii: the images within reach are (2/0.1)^3 per pair, and more below
 constexpr int LAST_ATTEMPT = 12;            ///< refinements of grid and window beyond the rules [T15]
 constexpr double TABLE_SHARE = 0.05;        ///< share of a half's budget for tables
 
@@ -81,7 +83,7 @@ public:
         : request(request), box(scaledBox(request)),
           error(BUDGET_PER_HALF*request.tolerance*(box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1)),
           meanPhi(volumeFraction(request)), phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)),
-          extent(std::min(LARGEST_EXTENT, std::cbrt(4.0/3*M_PI*request.numParticles/phi))) {
+          extent(extentOf(request, phi)) {
     }
 
     /** @param xi  in 1/a */
@@ -142,6 +144,15 @@ private:
         return Lattice(v.col(0), v.col(1), v.col(2));
     }
 
+    /** Edge of the cube that the particles fill at volume fraction phi, in radii. */
+    static double extentOf(const PlanRequest& r, double phi) {
+        const double lengths[3] = {r.box.length(0), r.box.length(1), r.box.length(2)};
+        const double shortest = *std::min_element(lengths, lengths + 3), longest = *std::max_element(lengths, lengths + 3);
+        if (longest > LONG_BOX*shortest)
+            return std::numeric_limits<double>::infinity();
+        return std::min(LARGEST_EXTENT, std::cbrt(4.0/3*M_PI*r.numParticles/phi));
+    }
+
     double waveErrorOf(const Plan& plan) const {
         return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi, extent);
     }
@@ -186,10 +197,10 @@ void checkRequest(const PlanRequest& r) {
     if (r.overrides.xi > 0 && (xi < SMALLEST_XI || xi > LARGEST_XI))
         message << "splitting parameter " << r.overrides.xi << " /nm is " << xi << " in units of 1/radius, outside ["
                 << SMALLEST_XI << ", " << LARGEST_XI << "]; call setSplittingParameter(0) for the automatic one";
-    for (int d = 0; d < 3; d++)
-        if (r.box.length(d) < 1e-3*r.radius)
-            message << "box vector " << d << " has length " << r.box.length(d) << " nm, less than 1e-3 of the radius "
-                    << r.radius << " nm; use a larger box";
+    for (int d = 2; d >= 0 && message.str().empty(); d--)
+        if (r.box.length(d) < SMALLEST_BOX*r.radius)
+            message << "box vector " << d << " has length " << r.box.length(d) << " nm, less than " << SMALLEST_BOX
+                    << " of the radius " << r.radius << " nm; use a larger box";
     if (!message.str().empty())
         throw std::invalid_argument(message.str());
 }

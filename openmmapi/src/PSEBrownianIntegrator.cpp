@@ -60,6 +60,12 @@ void PSEBrownianIntegrator::requireBound(const char* method) const {
         refuse(string(method) + " needs a Context: this integrator is not bound to a context! Create one first");
 }
 
+void PSEBrownianIntegrator::requirePositions(const char* method) const {
+    requireBound(method);
+    if (!positionsSet)
+        refuse(string(method) + " needs positions, and none have been set; call Context.setPositions first");
+}
+
 void PSEBrownianIntegrator::setTemperature(double value) {
     if (!std::isfinite(value) || value < 0) {
         std::ostringstream message;
@@ -205,8 +211,14 @@ void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
     Kernel created = contextRef.getPlatform().createKernel(IntegratePSEStepKernel::Name(), contextRef);
     created.getAs<IntegratePSEStepKernel>().initialize(contextRef, *this, seen);
     kernel = created;
+    positionsSet = false;
     context = &contextRef;
     owner = &contextRef.getOwner();
+}
+
+void PSEBrownianIntegrator::stateChanged(State::DataType changed) {
+    if (changed == State::Positions)
+        positionsSet = true;
 }
 
 void PSEBrownianIntegrator::cleanup() {
@@ -235,7 +247,7 @@ void PSEBrownianIntegrator::step(int steps) {
 }
 
 vector<Vec3> PSEBrownianIntegrator::applyMobility(const vector<Vec3>& forces) {
-    requireBound("applyMobility");
+    requirePositions("applyMobility");
     if (static_cast<int>(forces.size()) != context->getSystem().getNumParticles()) {
         std::ostringstream message;
         message << "applyMobility was given " << forces.size() << " forces; the System has "
@@ -247,7 +259,7 @@ vector<Vec3> PSEBrownianIntegrator::applyMobility(const vector<Vec3>& forces) {
 }
 
 vector<Vec3> PSEBrownianIntegrator::sampleBrownianDisplacements(int count) {
-    requireBound("sampleBrownianDisplacements");
+    requirePositions("sampleBrownianDisplacements");
     if (count < 0) {
         std::ostringstream message;
         message << "sampleBrownianDisplacements was asked for " << count << " samples; the count cannot be negative";

@@ -282,7 +282,7 @@ void HostStepKernel::loadCheckpoint(std::istream& stream) {
     if (theirs != ours)
         throw OpenMMException("PSEBrownianIntegrator: the checkpoint was written with other numerical parameters (" + theirs +
                               ") than this Context has (" + ours + "); create the Context with the same settings, or give them "
-                              "by setNumericalParameters");
+                              "by setNumericalParameters. Positions, box and time of this Context are now the checkpoint's");
     seed = theirSeed;
     steps = theirSteps;
     samples = theirSamples;

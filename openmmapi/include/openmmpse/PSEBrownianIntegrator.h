@@ -183,6 +183,7 @@ protected:
     std::vector<std::string> getKernelNames() override;
     double computeKineticEnergy() override;
     bool kineticEnergyRequiresForce() const override { return false; }
+    void stateChanged(OpenMM::State::DataType changed) override;
     void createCheckpoint(std::ostream& stream) const override;
     void loadCheckpoint(std::istream& stream) override;
     void serializeParameters(OpenMM::SerializationNode& node) const override;
@@ -191,6 +192,7 @@ protected:
 private:
     void requireUnbound(const char* setter) const;
     void requireBound(const char* method) const;
+    void requirePositions(const char* method) const;
 
     double temperature, viscosity, radius;
     double tolerance = 1e-3, shearRate = 0;
@@ -200,6 +202,7 @@ private:
     int randomSeed = 0;
     std::map<int, double> particleRadii;
     NumericalParameters requested;
+    bool positionsSet = false;
     OpenMM::Kernel kernel;
 };
 
