@@ -9,12 +9,12 @@ namespace {
 std::vector<double> chebyshevCoefficients(const std::function<double(double)>& f, int n) {
     std::vector<double> values(n), c(n);
     for (int j = 0; j < n; j++)
-        values[j] = f(std::cos(M_PI*(j + 0.5)/n));
+        values[j] = f(std::cos(M_PI * (j + 0.5) / n));
     for (int k = 0; k < n; k++) {
         double sum = 0;
         for (int j = 0; j < n; j++)
-            sum += values[j]*std::cos(M_PI*k*(j + 0.5)/n);
-        c[k] = (k == 0 ? 1.0 : 2.0)*sum/n;
+            sum += values[j] * std::cos(M_PI * k * (j + 0.5) / n);
+        c[k] = (k == 0 ? 1.0 : 2.0) * sum / n;
     }
     return c;
 }
@@ -25,9 +25,9 @@ std::vector<double> toPowers(const std::vector<double>& chebyshev) {
     current[0] = 1; // T_0
     for (int k = 0; k < n; k++) {
         for (int i = 0; i < n; i++)
-            powers[i] += chebyshev[k]*current[i];
+            powers[i] += chebyshev[k] * current[i];
         for (int i = 0; i < n; i++) // T_1 = t T_0, then T_{k+1} = 2 t T_k - T_{k-1}
-            next[i] = (k == 0 ? 1 : 2)*(i > 0 ? current[i - 1] : 0) - previous[i];
+            next[i] = (k == 0 ? 1 : 2) * (i > 0 ? current[i - 1] : 0) - previous[i];
         previous = current;
         current = next;
     }
@@ -39,11 +39,11 @@ std::vector<double> toPowers(const std::vector<double>& chebyshev) {
 double Polynomial::operator()(double t) const {
     double b1 = 0, b2 = 0;
     for (int k = degree(); k > 0; k--) {
-        const double b = chebyshev[k] + 2*t*b1 - b2;
+        const double b = chebyshev[k] + 2 * t * b1 - b2;
         b2 = b1;
         b1 = b;
     }
-    return chebyshev[0] + t*b1 - b2;
+    return chebyshev[0] + t * b1 - b2;
 }
 
 Polynomial fitPolynomial(const std::function<double(double)>& f, int degree) {
@@ -53,7 +53,8 @@ Polynomial fitPolynomial(const std::function<double(double)>& f, int degree) {
     return p;
 }
 
-Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree, int maxDegree) {
+Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree,
+                         int maxDegree) {
     Polynomial p;
     p.chebyshev = chebyshevCoefficients(f, maxDegree + 1);
     int degree = maxDegree;

@@ -8,12 +8,13 @@
 namespace PSE::numerics {
 
 /**
- * A polynomial in t in [-1, 1], fitted at Chebyshev points, in both bases: Chebyshev (stable at any degree, for
- * double) and powers of t (Horner's rule, for the fast paths).
+ * A polynomial in t in [-1, 1], fitted at Chebyshev points, in both bases: Chebyshev (stable at any
+ * degree, for double) and powers of t (Horner's rule, for the fast paths).
  */
 struct Polynomial {
     std::vector<double> chebyshev; ///< f(t) = sum c_n T_n(t)
-    std::vector<double> powers;    ///< f(t) = sum p_n t^n; loses digits where the degree is high (RealTable: xi rc > 8)
+    /// f(t) = sum p_n t^n; loses digits where the degree is high (RealTable: xi rc > 8)
+    std::vector<double> powers;
 
     int degree() const { return static_cast<int>(chebyshev.size()) - 1; }
     /** Clenshaw's recurrence in the Chebyshev basis. */
@@ -24,10 +25,11 @@ struct Polynomial {
 Polynomial fitPolynomial(const std::function<double(double)>& f, int degree);
 
 /**
- * The lowest degree (>= minDegree) whose neglected Chebyshev coefficients sum to less than maxError, from samples
- * at maxDegree + 1 points. The fit uses maxDegree if none does.
+ * The lowest degree (>= minDegree) whose neglected Chebyshev coefficients sum to less than
+ * maxError, from samples at maxDegree + 1 points. The fit uses maxDegree if none does.
  */
-Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree, int maxDegree);
+Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree,
+                         int maxDegree);
 
 } // namespace PSE::numerics
 

@@ -11,10 +11,11 @@ Lattice::Lattice(const Vec3& a, const Vec3& b, const Vec3& c) {
     boxVectors.col(2) = c;
     if (!boxVectors.allFinite())
         throw std::invalid_argument("the periodic box vectors are not finite; set a finite box");
-    if (boxVectors(0, 0) <= 0 || boxVectors(1, 1) <= 0 || boxVectors(2, 2) <= 0 || boxVectors(1, 0) != 0 ||
-        boxVectors(2, 0) != 0 || boxVectors(2, 1) != 0)
-        throw std::invalid_argument("the periodic box vectors are not in reduced form (a = (ax, 0, 0), b = (bx, by, 0), "
-                                    "c = (cx, cy, cz) with ax, by, cz > 0)");
+    if (boxVectors(0, 0) <= 0 || boxVectors(1, 1) <= 0 || boxVectors(2, 2) <= 0 ||
+        boxVectors(1, 0) != 0 || boxVectors(2, 0) != 0 || boxVectors(2, 1) != 0)
+        throw std::invalid_argument(
+            "the periodic box vectors are not in reduced form (a = (ax, 0, 0), b = (bx, by, 0), "
+            "c = (cx, cy, cz) with ax, by, cz > 0)");
     inverse = boxVectors.inverse();
     // Upper triangular, as the matrix is: keep its zeros exact.
     inverse(1, 0) = inverse(2, 0) = inverse(2, 1) = 0;
@@ -40,21 +41,24 @@ Vec3 Lattice::wrapped(const Vec3& x) const {
 
 Vec3 Lattice::minimumImage(Vec3 d) const {
     for (int axis = 2; axis >= 0; axis--)
-        d -= boxVectors.col(axis)*std::floor(d[axis]/boxVectors(axis, axis) + 0.5);
+        d -= boxVectors.col(axis) * std::floor(d[axis] / boxVectors(axis, axis) + 0.5);
     return d;
 }
 
 std::vector<Vec3> Lattice::imagesWithin(double range) const {
-    // |d + R| <= range needs |R| <= range + |d|, and n_d = (R . reciprocal vector d) is bounded by that length.
-    const double reach = range + boxVectors.col(0).norm() + boxVectors.col(1).norm() + boxVectors.col(2).norm();
+    // |d + R| <= range needs |R| <= range + |d|, and n_d = (R . reciprocal vector d) is bounded by
+    // that length.
+    const double reach =
+        range + boxVectors.col(0).norm() + boxVectors.col(1).norm() + boxVectors.col(2).norm();
     int limit[3];
-    for (int d = 0; d < 3; d++) // fractional differences are below 1, so images beyond this are out of range
-        limit[d] = static_cast<int>(std::floor(range*inverse.row(d).norm() + 1));
+    // fractional differences are below 1, so images beyond this are out of range
+    for (int d = 0; d < 3; d++)
+        limit[d] = static_cast<int>(std::floor(range * inverse.row(d).norm() + 1));
     std::vector<Vec3> images;
     for (int i = -limit[0]; i <= limit[0]; i++)
         for (int j = -limit[1]; j <= limit[1]; j++)
             for (int k = -limit[2]; k <= limit[2]; k++) {
-                const Vec3 image = boxVectors*Vec3(i, j, k);
+                const Vec3 image = boxVectors * Vec3(i, j, k);
                 if (image.norm() <= reach)
                     images.push_back(image);
             }

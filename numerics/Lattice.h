@@ -13,27 +13,36 @@ namespace PSE::numerics {
  */
 class Lattice {
 public:
-    /** @throws std::invalid_argument if a vector is not finite, the diagonal not positive, or an upper entry not zero */
+    /**
+     * @throws std::invalid_argument if a vector is not finite, the diagonal not positive, or an
+     * upper entry not zero
+     */
     Lattice(const Vec3& a, const Vec3& b, const Vec3& c);
     static Lattice orthorhombic(double x, double y, double z);
 
     /** Box vectors as columns. */
     const Matrix3& vectors() const { return boxVectors; }
-    double volume() const { return boxVectors(0, 0)*boxVectors(1, 1)*boxVectors(2, 2); }
+    double volume() const { return boxVectors(0, 0) * boxVectors(1, 1) * boxVectors(2, 2); }
     /** Length of box vector d (not the distance between opposite faces). */
     double length(int d) const { return boxVectors.col(d).norm(); }
-    /** Smallest diagonal entry: no lattice vector is shorter, and minimumImage() is exact below half of it. */
+    /**
+     * Smallest diagonal entry: no lattice vector is shorter, and minimumImage() is exact below half
+     * of it.
+     */
     double smallestWidth() const;
     /** Coordinates in units of the box vectors, not wrapped. */
-    Vec3 fractional(const Vec3& x) const { return inverse*x; }
-    Vec3 cartesian(const Vec3& s) const { return boxVectors*s; }
+    Vec3 fractional(const Vec3& x) const { return inverse * x; }
+    Vec3 cartesian(const Vec3& s) const { return boxVectors * s; }
     /** The image of x in the primary box, fractional coordinates in [0, 1). */
     Vec3 wrapped(const Vec3& x) const;
     /** The shortest image of a difference vector, exact if shorter than smallestWidth()/2. */
     Vec3 minimumImage(Vec3 d) const;
     /** 2 pi times the reciprocal vectors, as columns: k = waveVectors()*n with integer n. */
-    Matrix3 waveVectors() const { return 2*M_PI*inverse.transpose(); }
-    /** All lattice vectors R for which some |d + R| <= range can occur with d between two points of the primary box. */
+    Matrix3 waveVectors() const { return 2 * M_PI * inverse.transpose(); }
+    /**
+     * All lattice vectors R for which some |d + R| <= range can occur with d between two points of
+     * the primary box.
+     */
     std::vector<Vec3> imagesWithin(double range) const;
     bool operator==(const Lattice& other) const { return boxVectors == other.boxVectors; }
     bool operator!=(const Lattice& other) const { return !(*this == other); }

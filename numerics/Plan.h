@@ -26,37 +26,40 @@ struct PlanOverrides {
 /** What a Plan depends on. */
 struct PlanRequest {
     Lattice box;
-    int numParticles;          ///< particles that feel the fluid
-    double radius;             ///< their hydrodynamic radius a
-    double tolerance;          ///< allowed relative error of M f
-    bool thermal;              ///< whether there will be noise (Lanczos iterations have a price)
-    double singleFloor;        ///< smallest tolerance the platform's single precision serves; infinite: always double
-    bool directSums;           ///< the platform sums over modes directly, without a grid (Reference)
+    int numParticles; ///< particles that feel the fluid
+    double radius;    ///< their hydrodynamic radius a
+    double tolerance; ///< allowed relative error of M f
+    bool thermal;     ///< whether there will be noise (Lanczos iterations have a price)
+    /// smallest tolerance the platform's single precision serves; infinite: always double
+    double singleFloor;
+    /// the platform sums over modes directly, without a grid (Reference)
+    bool directSums;
     PlanOverrides overrides;
 };
 
 /** Everything a platform needs to know about the numerics. */
 struct Plan {
     std::shared_ptr<const Split> split; ///< in reduced units (lengths in a)
-    double a;                  ///< radius
-    double xi;                 ///< splitting parameter (1/nm)
-    double realCutoff;         ///< range of the real half
-    bool sumImages;            ///< the range exceeds half the box: sum explicitly over all images
-    std::array<int, 3> grid;   ///< M_d
-    int windowSupport;         ///< P
-    double windowShape;        ///< beta
-    double lanczosTolerance;   ///< relative error of the real-space noise
-    double tableError;         ///< absolute error allowed in tables, 1/(6 pi eta a)
-    double predictedError;     ///< rms error of M f for unit random forces, 1/(6 pi eta a)
+    double a;                           ///< radius
+    double xi;                          ///< splitting parameter (1/nm)
+    double realCutoff;                  ///< range of the real half
+    /// the range exceeds half the box: sum explicitly over all images
+    bool sumImages;
+    std::array<int, 3> grid; ///< M_d
+    int windowSupport;       ///< P
+    double windowShape;      ///< beta
+    double lanczosTolerance; ///< relative error of the real-space noise
+    double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
+    double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
     Precision precision;
 
     /** Number of grid points; double, because a request may exceed any integer. */
-    double gridPoints() const { return double(grid[0])*grid[1]*grid[2]; }
+    double gridPoints() const { return double(grid[0]) * grid[1] * grid[2]; }
 };
 
 /**
- * Choose all parameters so that each half is in error by at most tolerance/2 for unit random forces at volume
- * fraction max(phi, 0.3), at the lowest cost by the model of PlanCost.h.
+ * Choose all parameters so that each half is in error by at most tolerance/2 for unit random forces
+ * at volume fraction max(phi, 0.3), at the lowest cost by the model of PlanCost.h.
  * @throws std::invalid_argument naming what cannot be met
  */
 Plan makePlan(const PlanRequest& request);
@@ -65,13 +68,15 @@ Plan makePlan(const PlanRequest& request);
 int nextFftSize(int n);
 
 /**
- * Root mean square error of the wave half on a grid, for unit random forces at volume fraction phi, in 1/(6 pi eta a):
- * aliases of the window in pairs and in the self mobility, and the modes beyond Nyquist [T14].
+ * Root mean square error of the wave half on a grid, for unit random forces at volume fraction phi,
+ * in 1/(6 pi eta a): aliases of the window in pairs and in the self mobility, and the modes beyond
+ * Nyquist [T14].
  * @param box     in radii
  * @param extent  pairs farther apart (in radii) are left out of the estimate; default: none
  */
-double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid, int windowSupport,
-                 double windowShape, double phi, double extent = std::numeric_limits<double>::infinity());
+double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
+                 int windowSupport, double windowShape, double phi,
+                 double extent = std::numeric_limits<double>::infinity());
 
 } // namespace PSE::numerics
 

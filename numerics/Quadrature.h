@@ -12,7 +12,8 @@ struct Quadrature {
 };
 
 /**
- * Gauss-Legendre rule, exact for polynomials up to degree 2n - 1; nodes by Newton iteration, error about 1e-15.
+ * Gauss-Legendre rule, exact for polynomials up to degree 2n - 1; nodes by Newton iteration, error
+ * about 1e-15.
  * @param n  number of nodes, >= 1
  */
 Quadrature gaussLegendre(int n, double from, double to);

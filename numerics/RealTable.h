@@ -8,19 +8,27 @@
 namespace PSE::numerics {
 
 /**
- * The real-space half as a platform evaluates it: RPY minus two polynomials in t = 2 r^2/rc^2 - 1 for the smooth wave
- * part, M_R = (F_rpy - F(t)) I + ((G_rpy - F_rpy)/r^2 - C(t)) r r^T [T7]. Reduced units of Split.h.
+ * The real-space half as a platform evaluates it: RPY minus two polynomials in t = 2 r^2/rc^2 - 1
+ * for the smooth wave part, M_R = (F_rpy - F(t)) I + ((G_rpy - F_rpy)/r^2 - C(t)) r r^T [T7].
+ * Reduced units of Split.h.
  */
 struct RealTable {
-    double rc;            ///< range in radii
-    double self;          ///< diagonal of M_R
-    Polynomial F, C;      ///< wave part; the errors of F and of rc^2 C are below the maxError asked for
+    double rc;   ///< range in radii
+    double self; ///< diagonal of M_R
+    /// wave part; the errors of F and of rc^2 C are below the maxError asked for
+    Polynomial F, C;
 
-    /** Real-space scalars, M_R = F I + C r r^T, at 0 <= r <= rc; C = 0 at r = 0, where r r^T vanishes. */
+    /**
+     * Real-space scalars, M_R = F I + C r r^T, at 0 <= r <= rc; C = 0 at r = 0, where r r^T
+     * vanishes.
+     */
     SmoothScalars operator()(double r) const;
 };
 
-/** @param maxError  absolute error allowed in either scalar, in 1/(6 pi eta a); 1e-13 is the floor of the quadrature */
+/**
+ * @param maxError  absolute error allowed in either scalar, in 1/(6 pi eta a); 1e-13 is the floor
+ * of the quadrature
+ */
 RealTable makeRealTable(const Split& split, double rc, double maxError);
 
 } // namespace PSE::numerics

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The public C++ API as a C++ program uses it, on each platform: plugins loaded by OpenMM, not linked.
+// The public C++ API as a C++ program uses it, on each platform: plugins loaded by OpenMM, not
+// linked.
 #include "OpenMM.h"
 #include "openmmpse/PSEBrownianIntegrator.h"
 #include <cmath>
@@ -19,8 +20,10 @@ constexpr double ETA = 600, RADIUS = 1, BOX = 10;
 class CppApi : public testing::TestWithParam<const char*> {
 protected:
     static void SetUpTestSuite() {
-        const char* folders = std::getenv("OPENMM_PLUGIN_DIR"); // separated by ':', as OpenMM's Python layer reads it
-        ASSERT_NE(folders, nullptr) << "set OPENMM_PLUGIN_DIR to the folders of OpenMM's plugins and of ours";
+        const char* folders =
+            std::getenv("OPENMM_PLUGIN_DIR"); // separated by ':', as OpenMM's Python layer reads it
+        ASSERT_NE(folders, nullptr)
+            << "set OPENMM_PLUGIN_DIR to the folders of OpenMM's plugins and of ours";
         std::istringstream list(folders);
         for (string folder; std::getline(list, folder, ':');)
             Platform::loadPluginsFromDirectory(folder);
@@ -38,8 +41,8 @@ System cubicSystem(int numParticles) {
 
 /** Mobility of one particle in a cube, in units of 1/(6 pi eta a): exact for RPY. */
 double exactSelfMobility() {
-    const double c = RADIUS/BOX;
-    return 1 - 2.8372974794806*c + 4*M_PI/3*c*c*c;
+    const double c = RADIUS / BOX;
+    return 1 - 2.8372974794806 * c + 4 * M_PI / 3 * c * c * c;
 }
 
 } // namespace
@@ -52,8 +55,8 @@ TEST_P(CppApi, OneParticleInACubeHasTheExactMobility) {
     Context context(system, integrator, platform());
     context.setPositions({Vec3(1.2, 3.4, 5.6)});
     const vector<Vec3> u = integrator.applyMobility({Vec3(0, 0, 2)});
-    EXPECT_NEAR(u[0][2]*6*M_PI*ETA*RADIUS/2, exactSelfMobility(), 1e-6);
-    EXPECT_NEAR(u[0][0]*6*M_PI*ETA*RADIUS/2, 0, 1e-6);
+    EXPECT_NEAR(u[0][2] * 6 * M_PI * ETA * RADIUS / 2, exactSelfMobility(), 1e-6);
+    EXPECT_NEAR(u[0][0] * 6 * M_PI * ETA * RADIUS / 2, 0, 1e-6);
 }
 
 TEST_P(CppApi, AStepWithoutNoiseIsTheMobilityTimesTheForce) {
@@ -69,7 +72,7 @@ TEST_P(CppApi, AStepWithoutNoiseIsTheMobilityTimesTheForce) {
     integrator.step(1);
     const State state = context.getState(State::Positions | State::Velocities);
     for (int d = 0; d < 3; d++) {
-        EXPECT_NEAR(state.getPositions()[0][d], Vec3(1, 2, 3)[d] + 0.5*u[d], 1e-15);
+        EXPECT_NEAR(state.getPositions()[0][d], Vec3(1, 2, 3)[d] + 0.5 * u[d], 1e-15);
         EXPECT_DOUBLE_EQ(state.getVelocities()[0][d], u[d]);
     }
     EXPECT_DOUBLE_EQ(state.getTime(), 0.5);
@@ -83,7 +86,7 @@ TEST_P(CppApi, ParametersReproduceAPlan) {
     Context context(system, first, platform());
     vector<Vec3> positions;
     for (int i = 0; i < 5; i++)
-        positions.push_back(Vec3(i, 0.5*i, 9 - i));
+        positions.push_back(Vec3(i, 0.5 * i, 9 - i));
     context.setPositions(positions);
     const PSE::NumericalParameters used = first.getNumericalParameters();
     PSEBrownianIntegrator second(300, ETA, RADIUS, 0.1);
@@ -126,8 +129,7 @@ TEST_P(CppApi, RefusalNamesTheSetter) {
     try {
         Context context(system, integrator, platform());
         FAIL() << "unequal radii were accepted";
-    }
-    catch (const OpenMMException& refusal) {
+    } catch (const OpenMMException& refusal) {
         EXPECT_NE(string(refusal.what()).find("setParticleRadius"), string::npos) << refusal.what();
     }
     integrator.setParticleRadius(1, RADIUS); // the same integrator can be put right
@@ -135,4 +137,6 @@ TEST_P(CppApi, RefusalNamesTheSetter) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Platforms, CppApi, testing::Values("Reference", "CPU"),
-                         [](const testing::TestParamInfo<const char*>& info) { return string(info.param); });
+                         [](const testing::TestParamInfo<const char*>& info) {
+                             return string(info.param);
+                         });

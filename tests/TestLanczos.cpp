@@ -25,12 +25,12 @@ struct DenseSpace {
         : M(M), storage(LanczosTridiagonal::MAX_ITERATIONS + 1, VectorXd::Zero(M.rows())) {}
     Vector& basis(int i) { return storage.at(i); }
     void multiply(const Vector& v, Vector& Mv) {
-        Mv = M*v;
+        Mv = M * v;
         products++;
     }
     double dot(const Vector& v, const Vector& w) { return v.dot(w); }
-    void scaledCopy(double s, const Vector& v, Vector& out) { out = s*v; }
-    void addScaled(double s, const Vector& v, Vector& out) { out += s*v; }
+    void scaledCopy(double s, const Vector& v, Vector& out) { out = s * v; }
+    void addScaled(double s, const Vector& v, Vector& out) { out += s * v; }
 
     MatrixXd M;
     std::vector<VectorXd> storage;
@@ -39,7 +39,7 @@ struct DenseSpace {
 
 MatrixXd squareRoot(const MatrixXd& M) {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(M);
-    return eigen.eigenvectors()*eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal()*
+    return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
            eigen.eigenvectors().transpose();
 }
 
@@ -57,17 +57,17 @@ MatrixXd withEigenvalues(const VectorXd& values, unsigned seed) {
     const int n = static_cast<int>(values.size());
     MatrixXd A(n, n);
     for (int i = 0; i < n; i++)
-        A.col(i) = randomVector(n, 1000*seed + i); // no column may be a vector that a test draws
+        A.col(i) = randomVector(n, 1000 * seed + i); // no column may be a vector that a test draws
     const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(A).householderQ();
-    const MatrixXd M = Q*values.asDiagonal()*Q.transpose();
-    return 0.5*(M + M.transpose());
+    const MatrixXd M = Q * values.asDiagonal() * Q.transpose();
+    return 0.5 * (M + M.transpose());
 }
 
 /** Eigenvalues spread evenly in their logarithm from 1/condition to 1. */
 VectorXd spread(int n, double condition) {
     VectorXd values(n);
     for (int i = 0; i < n; i++)
-        values[i] = std::pow(condition, n > 1 ? -double(i)/(n - 1) : 0);
+        values[i] = std::pow(condition, n > 1 ? -double(i) / (n - 1) : 0);
     return values;
 }
 
@@ -85,8 +85,8 @@ Outcome solve(const MatrixXd& M, const VectorXd& z, double tolerance,
     try {
         outcome.iterations =
             lanczosSquareRoot(space, z, outcome.root, tolerance, negativeTolerance, full);
-        const VectorXd exact = squareRoot(M)*z;
-        outcome.error = (outcome.root - exact).norm()/std::max(exact.norm(), 1e-300);
+        const VectorXd exact = squareRoot(M) * z;
+        outcome.error = (outcome.root - exact).norm() / std::max(exact.norm(), 1e-300);
     } catch (const std::runtime_error& e) {
         outcome.message = e.what();
     }
@@ -105,7 +105,7 @@ void expectMentions(const std::string& message, const std::vector<std::string>& 
 TEST(Lanczos, MultiplesOfTheIdentityTakeAtMostTwoIterations) {
     for (double scale : {1.0, 2.0, 1e-6, 1e6})
         for (int n : {1, 2, 30}) {
-            const Outcome o = solve(scale*MatrixXd::Identity(n, n), randomVector(n, 3), 1e-10);
+            const Outcome o = solve(scale * MatrixXd::Identity(n, n), randomVector(n, 3), 1e-10);
             EXPECT_EQ(o.message, "");
             EXPECT_LE(o.iterations, 2);
             EXPECT_LT(o.error, 1e-14);
@@ -121,9 +121,9 @@ TEST(Lanczos, DiagonalMatrices) {
     for (int i = 0; i < 5; i++)
         EXPECT_NEAR(o.root[i], i + 1, 1e-12);
     // z along one axis stays there: one product.
-    const Outcome axis = solve(M, 3*VectorXd::Unit(5, 2), 1e-13);
+    const Outcome axis = solve(M, 3 * VectorXd::Unit(5, 2), 1e-13);
     EXPECT_EQ(axis.iterations, 1);
-    EXPECT_LT((axis.root - 9*VectorXd::Unit(5, 2)).norm(), 1e-14);
+    EXPECT_LT((axis.root - 9 * VectorXd::Unit(5, 2)).norm(), 1e-14);
 }
 
 TEST(Lanczos, RandomMatricesOfEverySizeAreExactWhenTheSpaceIsExhausted) {
@@ -162,7 +162,7 @@ TEST(Lanczos, IllConditionedMatricesKeepTheToleranceWithinAFactor) {
             const Outcome o = solve(withEigenvalues(spread(127, condition), 17),
                                     randomVector(127, 19), tolerance);
             ASSERT_EQ(o.message, "") << condition;
-            EXPECT_LE(o.error, 6*tolerance)
+            EXPECT_LE(o.error, 6 * tolerance)
                 << condition << " " << tolerance << " " << o.iterations;
         }
 }
@@ -174,7 +174,7 @@ TEST(Lanczos, StopsAsSoonAsTheToleranceIsMet) {
     for (double tolerance : {1e-2, 1e-3, 1e-4, 1e-6}) {
         const Outcome o = solve(M, randomVector(90, 15), tolerance);
         EXPECT_LE(o.error, tolerance);
-        EXPECT_GT(o.error, 0.02*tolerance)
+        EXPECT_GT(o.error, 0.02 * tolerance)
             << "one iteration less would have done: " << o.iterations;
     }
 }
@@ -184,7 +184,7 @@ TEST(Lanczos, WorksWithoutReorthogonalisationToModerateTolerances) {
     for (double tolerance : {1e-2, 1e-4, 1e-6}) {
         const Outcome o = solve(M, randomVector(127, 29), tolerance, 1e-12, false);
         ASSERT_EQ(o.message, "");
-        EXPECT_LE(o.error, 5*tolerance) << tolerance;
+        EXPECT_LE(o.error, 5 * tolerance) << tolerance;
     }
 }
 
@@ -195,11 +195,11 @@ TEST(Lanczos, SingularMatricesHaveARoot) {
         M.row(3 + c) = M.row(c);
         M.col(3 + c) = M.col(c);
     }
-    M = M.transpose()*M; // positive semi-definite, rank 21 at most
+    M = M.transpose() * M; // positive semi-definite, rank 21 at most
     const Outcome o = solve(M, randomVector(24, 37), 1e-8);
     ASSERT_EQ(o.message, "");
     EXPECT_LT(o.error, 1e-7);
-    EXPECT_LT((o.root.segment(0, 3) - o.root.segment(3, 3)).norm(), 1e-6*o.root.norm());
+    EXPECT_LT((o.root.segment(0, 3) - o.root.segment(3, 3)).norm(), 1e-6 * o.root.norm());
     // z in the null space, and the zero matrix.
     VectorXd null = VectorXd::Zero(24);
     null[0] = 1;
@@ -219,9 +219,9 @@ TEST(Lanczos, ZeroNoiseGivesZeroWithoutAProduct) {
 TEST(Lanczos, ScalesWithTheNoiseAndTheMatrix) {
     const MatrixXd M = withEigenvalues(spread(40, 100), 43);
     const VectorXd z = randomVector(40, 47);
-    const Outcome one = solve(M, z, 1e-6), larger = solve(1e10*M, 1e-20*z, 1e-6);
+    const Outcome one = solve(M, z, 1e-6), larger = solve(1e10 * M, 1e-20 * z, 1e-6);
     EXPECT_EQ(one.iterations, larger.iterations);
-    EXPECT_LT((larger.root*1e15 - one.root).norm(), 1e-10*one.root.norm());
+    EXPECT_LT((larger.root * 1e15 - one.root).norm(), 1e-10 * one.root.norm());
 }
 
 TEST(Lanczos, SmallNegativeEigenvaluesCountAsZero) {

@@ -25,14 +25,14 @@ std::vector<Lattice> boxes() {
     for (double x : {-0.5, 0.5})
         for (double y : {-0.5, 0.5})
             for (double z : {-0.5, 0.5})
-                all.push_back(Lattice(Vec3(2, 0, 0), Vec3(2*x, 2, 0), Vec3(2*y, 2*z, 2)));
+                all.push_back(Lattice(Vec3(2, 0, 0), Vec3(2 * x, 2, 0), Vec3(2 * y, 2 * z, 2)));
     return all;
 }
 
 /** A point with fractional coordinates spread over [-reach, reach]. */
 Vec3 randomPoint(const Lattice& box, double reach, std::mt19937& random) {
     std::uniform_real_distribution<double> uniform(-reach, reach);
-    return box.vectors()*Vec3(uniform(random), uniform(random), uniform(random));
+    return box.vectors() * Vec3(uniform(random), uniform(random), uniform(random));
 }
 
 /** The shortest of d + R over (2 reach + 1)^3 lattice vectors R. */
@@ -41,7 +41,7 @@ Vec3 shortestByForce(const Lattice& box, const Vec3& d, int reach) {
     for (int i = -reach; i <= reach; i++)
         for (int j = -reach; j <= reach; j++)
             for (int k = -reach; k <= reach; k++) {
-                const Vec3 image = d + box.vectors()*Vec3(i, j, k);
+                const Vec3 image = d + box.vectors() * Vec3(i, j, k);
                 if (image.norm() < best.norm())
                     best = image;
             }
@@ -66,7 +66,7 @@ std::string refusal(const Vec3& a, const Vec3& b, const Vec3& c) {
 TEST(Lattice, VolumeLengthAndWidthAreThoseOfTheVectors) {
     for (const Lattice& box : boxes()) {
         const Matrix3& v = box.vectors();
-        EXPECT_NEAR(box.volume(), v.col(0).dot(v.col(1).cross(v.col(2))), 1e-14*box.volume());
+        EXPECT_NEAR(box.volume(), v.col(0).dot(v.col(1).cross(v.col(2))), 1e-14 * box.volume());
         for (int d = 0; d < 3; d++)
             EXPECT_DOUBLE_EQ(box.length(d), std::sqrt(v.col(d).dot(v.col(d))));
         EXPECT_EQ(box.smallestWidth(), std::min({v(0, 0), v(1, 1), v(2, 2)}));
@@ -79,8 +79,8 @@ TEST(Lattice, NoLatticeVectorIsShorterThanTheSmallestWidth) {
             for (int j = -4; j <= 4; j++)
                 for (int k = -4; k <= 4; k++)
                     if (i != 0 || j != 0 || k != 0) {
-                        const double norm = (box.vectors()*Vec3(i, j, k)).norm();
-                        ASSERT_GE(norm, box.smallestWidth()*(1 - 1e-15));
+                        const double norm = (box.vectors() * Vec3(i, j, k)).norm();
+                        ASSERT_GE(norm, box.smallestWidth() * (1 - 1e-15));
                     }
 }
 
@@ -90,16 +90,16 @@ TEST(Lattice, FractionalAndCartesianAreInverse) {
         for (int i = 0; i < 100; i++) {
             const Vec3 x = randomPoint(box, 20, random);
             EXPECT_LT((box.cartesian(box.fractional(x)) - x).norm(),
-                      1e-14*(box.length(0) + x.norm()));
+                      1e-14 * (box.length(0) + x.norm()));
         }
 }
 
 TEST(Lattice, WaveVectorsAreTwoPiTimesTheReciprocalBasis) {
     for (const Lattice& box : boxes()) {
-        const Matrix3 product = box.waveVectors().transpose()*box.vectors();
-        EXPECT_LT((product - 2*M_PI*Matrix3::Identity()).norm(), 1e-14);
+        const Matrix3 product = box.waveVectors().transpose() * box.vectors();
+        EXPECT_LT((product - 2 * M_PI * Matrix3::Identity()).norm(), 1e-14);
         // Plane waves of integer n are periodic in the box, which is what the wave half needs.
-        const Vec3 k = box.waveVectors()*Vec3(2, -1, 3);
+        const Vec3 k = box.waveVectors() * Vec3(2, -1, 3);
         for (int d = 0; d < 3; d++)
             EXPECT_NEAR(std::cos(k.dot(box.vectors().col(d))), 1, 1e-13);
     }
@@ -113,7 +113,7 @@ TEST(Lattice, WrappedLiesInThePrimaryBoxAtALatticeVector) {
             EXPECT_TRUE(isInteger(box.fractional(x - w), 1e-13));
             EXPECT_GE(s.minCoeff(), -1e-15);
             EXPECT_LT(s.maxCoeff(), 1);
-            EXPECT_LT((box.wrapped(w) - w).norm(), 1e-14*box.length(0) + 1e-14*box.length(2));
+            EXPECT_LT((box.wrapped(w) - w).norm(), 1e-14 * box.length(0) + 1e-14 * box.length(2));
         }
 }
 
@@ -136,12 +136,12 @@ TEST(Lattice, MinimumImageIsTheShortestBelowHalfTheSmallestWidth) {
     for (const Lattice& box : boxes())
         for (int i = 0; i < 200; i++) {
             Vec3 direction(normal(random), normal(random), normal(random));
-            const double length = 0.499999*box.smallestWidth()*std::cbrt(uniform(random));
-            const Vec3 shortest = direction.normalized()*length;
+            const double length = 0.499999 * box.smallestWidth() * std::cbrt(uniform(random));
+            const Vec3 shortest = direction.normalized() * length;
             const Vec3 d =
-                shortest + box.vectors()*Vec3(shift(random), shift(random), shift(random));
-            ASSERT_LT((box.minimumImage(d) - shortest).norm(), 1e-13*d.norm() + 1e-15);
-            ASSERT_LT((shortestByForce(box, d, 2) - shortest).norm(), 1e-13*d.norm() + 1e-15);
+                shortest + box.vectors() * Vec3(shift(random), shift(random), shift(random));
+            ASSERT_LT((box.minimumImage(d) - shortest).norm(), 1e-13 * d.norm() + 1e-15);
+            ASSERT_LT((shortestByForce(box, d, 2) - shortest).norm(), 1e-13 * d.norm() + 1e-15);
         }
 }
 
@@ -152,7 +152,7 @@ TEST(Lattice, MinimumImageIsAnImageAtAnyDistance) {
             const Vec3 d = randomPoint(box, 3, random), image = box.minimumImage(d);
             ASSERT_TRUE(isInteger(box.fractional(d - image), 1e-12));
             for (int axis = 0; axis < 3; axis++)
-                ASSERT_LE(std::fabs(image[axis]), 0.5*box.vectors()(axis, axis)*(1 + 1e-12));
+                ASSERT_LE(std::fabs(image[axis]), 0.5 * box.vectors()(axis, axis) * (1 + 1e-12));
         }
 }
 
@@ -161,9 +161,9 @@ TEST(Lattice, ImagesWithinMissesNone) {
     for (const Lattice& box : boxes()) {
         if (box.length(0) > 100)
             continue;
-        for (double range : {0.1, 0.5*box.smallestWidth(), 1.7*box.smallestWidth(), 3.1}) {
+        for (double range : {0.1, 0.5 * box.smallestWidth(), 1.7 * box.smallestWidth(), 3.1}) {
             const std::vector<Vec3> images = box.imagesWithin(range);
-            const int reach = static_cast<int>(2 + 2*range/box.smallestWidth()) + 2;
+            const int reach = static_cast<int>(2 + 2 * range / box.smallestWidth()) + 2;
             for (int trial = 0; trial < 6; trial++) {
                 const Vec3 d = box.wrapped(randomPoint(box, 1, random)) -
                                box.wrapped(randomPoint(box, 1, random));
@@ -173,7 +173,7 @@ TEST(Lattice, ImagesWithinMissesNone) {
                 for (int i = -reach; i <= reach; i++)
                     for (int j = -reach; j <= reach; j++)
                         for (int k = -reach; k <= reach; k++)
-                            expected += ((d + box.vectors()*Vec3(i, j, k)).norm() <= range);
+                            expected += ((d + box.vectors() * Vec3(i, j, k)).norm() <= range);
                 ASSERT_EQ(found, expected) << "range " << range;
             }
         }
@@ -189,8 +189,8 @@ TEST(Lattice, ImagesWithinHoldsNoVectorTwiceAndIsSymmetric) {
             zeros += (images[i].norm() == 0);
             bool mirrored = false;
             for (size_t j = 0; j < images.size(); j++) {
-                ASSERT_TRUE(i == j || (images[i] - images[j]).norm() > 0.5*box.smallestWidth());
-                mirrored = mirrored || (images[i] + images[j]).norm() < 1e-12*box.length(0);
+                ASSERT_TRUE(i == j || (images[i] - images[j]).norm() > 0.5 * box.smallestWidth());
+                mirrored = mirrored || (images[i] + images[j]).norm() < 1e-12 * box.length(0);
             }
             ASSERT_TRUE(mirrored);
         }
@@ -201,11 +201,11 @@ TEST(Lattice, ImagesWithinHoldsNoVectorTwiceAndIsSymmetric) {
 TEST(Lattice, ExtremeCornersOfThePrimaryBoxFindTheirImages) {
     // Two particles in opposite corners are close neighbours through the boundary.
     for (const Lattice& box : boxes()) {
-        const double gap = 1e-3*box.smallestWidth();
-        const Vec3 d = box.cartesian(Vec3(1, 1, 1)) - Vec3(gap, gap, gap)*2;
+        const double gap = 1e-3 * box.smallestWidth();
+        const Vec3 d = box.cartesian(Vec3(1, 1, 1)) - Vec3(gap, gap, gap) * 2;
         int found = 0;
-        for (const Vec3& image : box.imagesWithin(0.01*box.smallestWidth()))
-            found += ((d + image).norm() <= 0.01*box.smallestWidth());
+        for (const Vec3& image : box.imagesWithin(0.01 * box.smallestWidth()))
+            found += ((d + image).norm() <= 0.01 * box.smallestWidth());
         EXPECT_EQ(found, 1);
     }
 }

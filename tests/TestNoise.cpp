@@ -27,9 +27,9 @@ const Stream STREAMS[] = {Stream::StepReal, Stream::StepWave, Stream::SampleReal
 
 /** Normal numbers of `count` particles, three each. */
 Sample particles(const NoiseKey& key, int count) {
-    Sample all(3*count);
+    Sample all(3 * count);
     for (int i = 0; i < count; i++)
-        particleNoise(key, i, &all[3*i]);
+        particleNoise(key, i, &all[3 * i]);
     return all;
 }
 
@@ -38,12 +38,12 @@ Sample particles(const NoiseKey& key, int count) {
 double correlation(const Sample& a, const Sample& b) {
     double sum = 0;
     for (size_t i = 0; i < a.size(); i++)
-        sum += a[i]*b[i];
-    return sum/a.size();
+        sum += a[i] * b[i];
+    return sum / a.size();
 }
 
 void expectUncorrelated(const Sample& a, const Sample& b) {
-    EXPECT_LT(std::fabs(correlation(a, b)), SIGMAS/std::sqrt(double(a.size())));
+    EXPECT_LT(std::fabs(correlation(a, b)), SIGMAS / std::sqrt(double(a.size())));
     for (size_t i = 0; i < a.size(); i++)
         ASSERT_NE(a[i], b[i]);
 }
@@ -102,7 +102,7 @@ TEST(Noise, StreamsShareNoNumbers) {
             normals({7, stream, 3}, index, z);
             values.insert(z, z + 8);
         }
-    EXPECT_EQ(values.size(), 4u*2000u*8u);
+    EXPECT_EQ(values.size(), 4u * 2000u * 8u);
 }
 
 TEST(Noise, UsesAllBitsOfTheIndex) {
@@ -125,7 +125,7 @@ TEST(Noise, MomentsAreThoseOfANormalNumber) {
         double sum = 0;
         for (double value : z)
             sum += std::pow(value, m);
-        EXPECT_LT(std::fabs(sum/n - exact[m - 1]), SIGMAS*std::sqrt(variance[m - 1]/n))
+        EXPECT_LT(std::fabs(sum / n - exact[m - 1]), SIGMAS * std::sqrt(variance[m - 1] / n))
             << "moment " << m;
     }
 }
@@ -135,11 +135,11 @@ TEST(Noise, DistributionPassesTheKolmogorovSmirnovTest) {
     std::sort(z.begin(), z.end());
     double worst = 0;
     for (size_t i = 0; i < z.size(); i++) {
-        const double cdf = 0.5*std::erfc(-z[i]/std::sqrt(2.0));
-        worst = std::max(worst, std::max(std::fabs(cdf - double(i)/z.size()),
-                                         std::fabs(cdf - double(i + 1)/z.size())));
+        const double cdf = 0.5 * std::erfc(-z[i] / std::sqrt(2.0));
+        worst = std::max(worst, std::max(std::fabs(cdf - double(i) / z.size()),
+                                         std::fabs(cdf - double(i + 1) / z.size())));
     }
-    EXPECT_LT(worst*std::sqrt(double(z.size())), 2.70); // 2 exp(-2 x^2) = 1e-6 at x = 2.69
+    EXPECT_LT(worst * std::sqrt(double(z.size())), 2.70); // 2 exp(-2 x^2) = 1e-6 at x = 2.69
 }
 
 TEST(Noise, ComponentsAndNeighboursAreIndependent) {
@@ -147,14 +147,14 @@ TEST(Noise, ComponentsAndNeighboursAreIndependent) {
     const Sample z = particles({99, Stream::StepReal, 3}, count + 1);
     for (int lag : {1, 2, 3}) {
         double linear = 0, square = 0;
-        const int n = 3*count;
+        const int n = 3 * count;
         for (int i = 0; i < n; i++) {
-            linear += z[i]*z[i + lag];
-            square += (z[i]*z[i] - 1)*
-                      (z[i + lag]*z[i + lag] - 1); // catches radii shared by two numbers
+            linear += z[i] * z[i + lag];
+            square += (z[i] * z[i] - 1) *
+                      (z[i + lag] * z[i + lag] - 1); // catches radii shared by two numbers
         }
-        EXPECT_LT(std::fabs(linear/n), SIGMAS/std::sqrt(double(n)));
-        EXPECT_LT(std::fabs(square/n), SIGMAS*2/std::sqrt(double(n)));
+        EXPECT_LT(std::fabs(linear / n), SIGMAS / std::sqrt(double(n)));
+        EXPECT_LT(std::fabs(square / n), SIGMAS * 2 / std::sqrt(double(n)));
     }
 }
 
@@ -172,10 +172,10 @@ TEST(Noise, BoxMullerStaysFiniteAtTheExtremes) {
         }
     double z0, z1;
     boxMuller(0u, 0u, z0, z1); // the largest radius, along the first axis
-    EXPECT_NEAR(z0, std::sqrt(66*std::log(2.0)), 1e-12);
+    EXPECT_NEAR(z0, std::sqrt(66 * std::log(2.0)), 1e-12);
     EXPECT_EQ(z1, 0);
     boxMuller(0u, 0x40000000u, z0, z1); // a quarter turn
-    EXPECT_NEAR(z1, std::sqrt(66*std::log(2.0)), 1e-12);
+    EXPECT_NEAR(z1, std::sqrt(66 * std::log(2.0)), 1e-12);
 }
 
 TEST(Noise, SinglePrecisionGivesTheSameNumbers) {
@@ -190,7 +190,7 @@ TEST(Noise, SinglePrecisionGivesTheSameNumbers) {
         particleNoise({3, Stream::StepReal, 0}, i, y);
         for (int c = 0; c < 3; c++) {
             largest = std::max(largest, std::fabs(z[c] - y[c]));
-            square += (z[c] - y[c])*(z[c] - y[c])/(3*count);
+            square += (z[c] - y[c]) * (z[c] - y[c]) / (3 * count);
         }
     }
     EXPECT_LT(largest, 3e-5);
@@ -212,8 +212,9 @@ TEST(Modes, ExactlyOneOfAPairIsCanonical) {
             for (int l = -3; l <= 3; l++) {
                 const int canonical = isCanonicalMode(i, j, l) + isCanonicalMode(-i, -j, -l);
                 EXPECT_EQ(canonical, (i == 0 && j == 0 && l == 0) ? 0 : 1);
-                if (l > 0) { // the stored half of a real transform holds canonical modes beyond its
-                             // plane n3 = 0
+                // the stored half of a real transform holds canonical modes beyond its
+                if (l > 0) {
+                    // plane n3 = 0
                     EXPECT_TRUE(isCanonicalMode(i, j, l));
                 }
             }
@@ -252,7 +253,7 @@ TEST(Modes, DifferentPairsDrawDifferentNumbers) {
                     seen.insert({z[0].real(), z[0].imag()});
                     pairs++;
                 }
-    EXPECT_EQ(pairs, (9*9*9 - 1)/2);
+    EXPECT_EQ(pairs, (9 * 9 * 9 - 1) / 2);
     EXPECT_EQ(int(seen.size()), pairs);
 }
 
@@ -269,28 +270,28 @@ TEST(Modes, CovarianceIsTheUnitMatrix) {
                 modeNoise({77, Stream::SampleWave, 1}, i, j, l, z);
                 for (int c = 0; c < 3; c++)
                     for (int d = 0; d < 3; d++) {
-                        hermitian[c][d] += z[c]*std::conj(z[d]);
-                        plain[c][d] += z[c]*z[d];
+                        hermitian[c][d] += z[c] * std::conj(z[d]);
+                        plain[c][d] += z[c] * z[d];
                     }
-                real += 2*z[0].real()*z[0].real();
-                neighbour += z[0]*std::conj(previous);
+                real += 2 * z[0].real() * z[0].real();
+                neighbour += z[0] * std::conj(previous);
                 previous = z[0];
             }
-    const double limit = SIGMAS/std::sqrt(double(count));
+    const double limit = SIGMAS / std::sqrt(double(count));
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++) {
-            EXPECT_LT(std::abs(hermitian[c][d]/double(count) - (c == d ? 1.0 : 0.0)), limit);
-            EXPECT_LT(std::abs(plain[c][d]/double(count)), std::sqrt(2.0)*limit);
+            EXPECT_LT(std::abs(hermitian[c][d] / double(count) - (c == d ? 1.0 : 0.0)), limit);
+            EXPECT_LT(std::abs(plain[c][d] / double(count)), std::sqrt(2.0) * limit);
         }
-    EXPECT_LT(std::fabs(real/count - 1), std::sqrt(2.0)*limit);
-    EXPECT_LT(std::abs(neighbour/double(count)), limit);
+    EXPECT_LT(std::fabs(real / count - 1), std::sqrt(2.0) * limit);
+    EXPECT_LT(std::abs(neighbour / double(count)), limit);
 }
 
 TEST(Modes, FieldOfStoredHalfSpectrumIsRealWithTheRightVariance) {
     // sum_k z_k exp(i k x) over all non-Nyquist modes of a grid, each from its own call, is real:
     // the rule closes.
     for (int M : {5, 6}) {
-        const int m = (M - 1)/2;
+        const int m = (M - 1) / 2;
         double mean = 0;
         const int counters = 2000;
         int modes = 0;
@@ -305,13 +306,13 @@ TEST(Modes, FieldOfStoredHalfSpectrumIsRealWithTheRightVariance) {
                         Complex z[3];
                         modeNoise({1, Stream::StepWave, uint64_t(counter)}, i, j, l, z);
                         field +=
-                            z[1]*std::polar(1.0, 2*M_PI*(0.31*i + 0.62*j - 0.17*l));
+                            z[1] * std::polar(1.0, 2 * M_PI * (0.31 * i + 0.62 * j - 0.17 * l));
                         modes++;
                     }
             ASSERT_LT(std::fabs(field.imag()), 1e-12);
-            mean += field.real()*field.real()/counters;
+            mean += field.real() * field.real() / counters;
         }
-        EXPECT_LT(std::fabs(mean/modes - 1), SIGMAS*std::sqrt(2.0/counters))
+        EXPECT_LT(std::fabs(mean / modes - 1), SIGMAS * std::sqrt(2.0 / counters))
             << M; // variance: one per mode
     }
 }

@@ -21,29 +21,29 @@ const double DISTANCES[] = {0, 0.1, 0.5, 1.9, 2, 2.1, 5, 10};
 /** j0(x) - j1(x)/x and j2(x)/x^2 in extended precision: Taylor series below 3, closed forms above.
  */
 void besselReference(long double x, long double& transverse, long double& j2x2) {
-    const long double x2 = x*x;
+    const long double x2 = x * x;
     if (x < 3) {
         // j_l(x)/x^l = sum_n (-x^2/2)^n/(n! (2l + 2n + 1)!!)
         long double j[3] = {0, 0, 0};
         for (int l = 0; l < 3; l++) {
-            long double term = (l == 0 ? 1.0L : (l == 1 ? 1.0L/3 : 1.0L/15));
+            long double term = (l == 0 ? 1.0L : (l == 1 ? 1.0L / 3 : 1.0L / 15));
             for (int n = 0; n < 40; n++) {
                 j[l] += term;
-                term *= -x2/2/((n + 1)*(2*l + 2*n + 3));
+                term *= -x2 / 2 / ((n + 1) * (2 * l + 2 * n + 3));
             }
         }
         transverse = j[0] - j[1];
         j2x2 = j[2];
         return;
     }
-    const long double j0 = std::sin(x)/x, j1x = (j0 - std::cos(x))/x2;
+    const long double j0 = std::sin(x) / x, j1x = (j0 - std::cos(x)) / x2;
     transverse = j0 - j1x;
-    j2x2 = (3*j1x - j0)/x2;
+    j2x2 = (3 * j1x - j0) / x2;
 }
 
 long double hasimotoWeight(long double k, long double xi) {
-    const long double sinc = (k == 0 ? 1 : std::sin(k)/k), q = k*k/(4*xi*xi);
-    return sinc*sinc*(1 + q)*std::exp(-q);
+    const long double sinc = (k == 0 ? 1 : std::sin(k) / k), q = k * k / (4 * xi * xi);
+    return sinc * sinc * (1 + q) * std::exp(-q);
 }
 
 /**
@@ -52,17 +52,17 @@ long double hasimotoWeight(long double k, long double xi) {
  * power: error about 1e-18.
  */
 SmoothScalars waveReference(double xi, double r) {
-    const long double pi = std::acos(-1.0L), step = 2*pi/(r + 2 + 8/(long double)xi),
-                      last = 14*(long double)xi;
+    const long double pi = std::acos(-1.0L), step = 2 * pi / (r + 2 + 8 / (long double)xi),
+                      last = 14 * (long double)xi;
     long double F = 0, C = 0;
-    for (int i = 0; i*step < last; i++) {
-        const long double k = i*step, w = (i == 0 ? 0.5L : 1)*hasimotoWeight(k, xi);
+    for (int i = 0; i * step < last; i++) {
+        const long double k = i * step, w = (i == 0 ? 0.5L : 1) * hasimotoWeight(k, xi);
         long double transverse, j2x2;
-        besselReference(k*r, transverse, j2x2);
-        F += w*transverse;
-        C += w*k*k*j2x2;
+        besselReference(k * r, transverse, j2x2);
+        F += w * transverse;
+        C += w * k * k * j2x2;
     }
-    return {double(3/pi*step*F), double(3/pi*step*C)};
+    return {double(3 / pi * step * F), double(3 / pi * step * C)};
 }
 
 /**
@@ -70,54 +70,54 @@ SmoothScalars waveReference(double xi, double r) {
  * (2017), with a = 1, in extended precision; r > 0.
  */
 PairScalars closedForm(double xiDouble, double rDouble) {
-    const long double x = xiDouble, r = rDouble, x2 = x*x, x3 = x2*x, x4 = x2*x2, r2 = r*r,
-                      r3 = r2*r, r4 = r2*r2;
+    const long double x = xiDouble, r = rDouble, x2 = x * x, x3 = x2 * x, x4 = x2 * x2, r2 = r * r,
+                      r3 = r2 * r, r4 = r2 * r2;
     const long double root = std::sqrt(std::acos(-1.0L));
-    const long double lower = 4 + 4*r + 9*r2, upper = 4 - 4*r + 9*r2, m = 2 - r, p = 2 + r;
-    const long double e0 = std::exp(-r2*x2), em = std::exp(-m*m*x2),
-                      ep = std::exp(-p*p*x2);
-    const long double c0 = std::erfc(r*x), cm = std::erfc(-m*x), cp = std::erfc(p*x);
-    const long double F = (r < 2 ? -m*m*lower/(32*r3) : 0) +
-                          (18*r2*x2 + 3)/(64*root*r2*x3)*e0 +
-                          (2*x2*m*lower - 2 - 3*r)/(128*root*r3*x3)*em +
-                          (-2*x2*p*upper + 2 - 3*r)/(128*root*r3*x3)*ep +
-                          (3 - 36*r4*x4)/(128*r3*x4)*c0 +
-                          (4*x4*m*m*lower - 3)/(256*r3*x4)*cm +
-                          (4*x4*p*p*upper - 3)/(256*r3*x4)*cp;
-    const long double G = (r < 2 ? m*m*m*(2 + 3*r)/(16*r3) : 0) +
-                          (6*r2*x2 - 3)/(32*root*r2*x3)*e0 +
-                          (-2*x2*m*m*(2 + 3*r) + 2 + 3*r)/(64*root*r3*x3)*em +
-                          (2*x2*p*p*(2 - 3*r) - 2 + 3*r)/(64*root*r3*x3)*ep -
-                          3*(4*r4*x4 + 1)/(64*r3*x4)*c0 +
-                          (3 - 4*x4*m*m*m*(2 + 3*r))/(128*r3*x4)*cm +
-                          (3 - 4*x4*(2 - 3*r)*p*p*p)/(128*r3*x4)*cp;
+    const long double lower = 4 + 4 * r + 9 * r2, upper = 4 - 4 * r + 9 * r2, m = 2 - r, p = 2 + r;
+    const long double e0 = std::exp(-r2 * x2), em = std::exp(-m * m * x2),
+                      ep = std::exp(-p * p * x2);
+    const long double c0 = std::erfc(r * x), cm = std::erfc(-m * x), cp = std::erfc(p * x);
+    const long double F = (r < 2 ? -m * m * lower / (32 * r3) : 0) +
+                          (18 * r2 * x2 + 3) / (64 * root * r2 * x3) * e0 +
+                          (2 * x2 * m * lower - 2 - 3 * r) / (128 * root * r3 * x3) * em +
+                          (-2 * x2 * p * upper + 2 - 3 * r) / (128 * root * r3 * x3) * ep +
+                          (3 - 36 * r4 * x4) / (128 * r3 * x4) * c0 +
+                          (4 * x4 * m * m * lower - 3) / (256 * r3 * x4) * cm +
+                          (4 * x4 * p * p * upper - 3) / (256 * r3 * x4) * cp;
+    const long double G = (r < 2 ? m * m * m * (2 + 3 * r) / (16 * r3) : 0) +
+                          (6 * r2 * x2 - 3) / (32 * root * r2 * x3) * e0 +
+                          (-2 * x2 * m * m * (2 + 3 * r) + 2 + 3 * r) / (64 * root * r3 * x3) * em +
+                          (2 * x2 * p * p * (2 - 3 * r) - 2 + 3 * r) / (64 * root * r3 * x3) * ep -
+                          3 * (4 * r4 * x4 + 1) / (64 * r3 * x4) * c0 +
+                          (3 - 4 * x4 * m * m * m * (2 + 3 * r)) / (128 * r3 * x4) * cm +
+                          (3 - 4 * x4 * (2 - 3 * r) * p * p * p) / (128 * r3 * x4) * cp;
     return {double(F), double(G)};
 }
 
 Matrix3 tensor(const PairScalars& s, const Vec3& d) {
     const double r2 = d.squaredNorm();
-    return s.F*Matrix3::Identity() +
-           (r2 > 0 ? Matrix3((s.G - s.F)/r2*d*d.transpose()) : Matrix3::Zero());
+    return s.F * Matrix3::Identity() +
+           (r2 > 0 ? Matrix3((s.G - s.F) / r2 * d * d.transpose()) : Matrix3::Zero());
 }
 
 /** The periodic pair tensor by its two lattice sums, lengths in radii; error below 1e-13. */
 Matrix3 periodicTensor(const HasimotoSplit& split, double xi, const Lattice& box, const Vec3& d) {
     Matrix3 sum = Matrix3::Zero();
-    const double range = std::min(2 + 6.5/xi, split.maxDistance());
+    const double range = std::min(2 + 6.5 / xi, split.maxDistance());
     for (const Vec3& image : box.imagesWithin(range))
         if ((d + image).norm() <= range)
             sum += tensor(split.realScalars((d + image).norm()), d + image);
     int limit[3];
     for (int i = 0; i < 3; i++)
-        limit[i] = static_cast<int>(12.5*xi*box.length(i)/(2*M_PI)) + 1;
+        limit[i] = static_cast<int>(12.5 * xi * box.length(i) / (2 * M_PI)) + 1;
     for (int i = -limit[0]; i <= limit[0]; i++)
         for (int j = -limit[1]; j <= limit[1]; j++)
             for (int l = -limit[2]; l <= limit[2]; l++) {
-                const Vec3 k = box.waveVectors()*Vec3(i, j, l);
+                const Vec3 k = box.waveVectors() * Vec3(i, j, l);
                 const double k2 = k.squaredNorm();
-                if (k2 > 0 && k2 < 156*xi*xi)
-                    sum += 6*M_PI/box.volume()*split.waveWeight(std::sqrt(k2))/k2*
-                           std::cos(k.dot(d))*(Matrix3::Identity() - k*k.transpose()/k2);
+                if (k2 > 0 && k2 < 156 * xi * xi)
+                    sum += 6 * M_PI / box.volume() * split.waveWeight(std::sqrt(k2)) / k2 *
+                           std::cos(k.dot(d)) * (Matrix3::Identity() - k * k.transpose() / k2);
             }
     return sum;
 }
@@ -139,15 +139,15 @@ TEST(Rpy, ValuesAtSpecialDistances) {
     EXPECT_NEAR(rpyScalars(1e6).G, 1.5e-6, 1e-17);
     float F, G;
     rpyScalars(2.5f, F, G);
-    EXPECT_NEAR(F, 0.75/2.5 + 0.5/15.625, 1e-7);
-    EXPECT_NEAR(G, 1.5/2.5 - 1/15.625, 1e-7);
+    EXPECT_NEAR(F, 0.75 / 2.5 + 0.5 / 15.625, 1e-7);
+    EXPECT_NEAR(G, 1.5 / 2.5 - 1 / 15.625, 1e-7);
 }
 
 TEST(Rpy, ValueAndSlopeAreContinuousAtContact) {
     const double e = 1e-6;
     const PairScalars inside = rpyScalars(2 - e), at = rpyScalars(2.0), outside = rpyScalars(2 + e);
-    EXPECT_NEAR((at.F - inside.F)/e, (outside.F - at.F)/e, 1e-5);
-    EXPECT_NEAR((at.G - inside.G)/e, (outside.G - at.G)/e, 1e-5);
+    EXPECT_NEAR((at.F - inside.F) / e, (outside.F - at.F) / e, 1e-5);
+    EXPECT_NEAR((at.G - inside.G) / e, (outside.G - at.G) / e, 1e-5);
 }
 
 TEST(Rpy, IsFreeOfDivergence) {
@@ -155,8 +155,8 @@ TEST(Rpy, IsFreeOfDivergence) {
     // motion.
     for (double r : {0.3, 1.0, 1.9, 2.1, 3.0, 10.0}) {
         const double e = 1e-4;
-        const double slope = (rpyScalars(r + e).G - rpyScalars(r - e).G)/(2*e);
-        EXPECT_NEAR(slope + 2*(rpyScalars(r).G - rpyScalars(r).F)/r, 0, 1e-7);
+        const double slope = (rpyScalars(r + e).G - rpyScalars(r - e).G) / (2 * e);
+        EXPECT_NEAR(slope + 2 * (rpyScalars(r).G - rpyScalars(r).F) / r, 0, 1e-7);
     }
 }
 
@@ -177,7 +177,7 @@ TEST(Split, WaveScalarsHoldAtTheLimitsOfThePlan) {
     for (double xi : {1e-6, 1e-3, 20.0}) {
         const HasimotoSplit split(xi);
         for (double share : {0.0, 1e-4, 0.01, 0.2, 0.5, 1.0}) {
-            const double r = share*split.maxDistance(), scale = std::min(1.0, xi);
+            const double r = share * split.maxDistance(), scale = std::min(1.0, xi);
             const SmoothScalars s = split.waveScalars(r), exact = waveReference(xi, r);
             EXPECT_NEAR(s.F, exact.F, 1e-12 * scale) << xi << " " << r;
             EXPECT_NEAR(r * r * s.C, r * r * exact.C, 1e-12 * scale) << xi << " " << r;
@@ -212,8 +212,8 @@ TEST(Split, RealSelfIsTheClosedForm) {
     const double root = std::sqrt(M_PI);
     for (double xi : {1e-6, 0.05, 0.3, 0.5, 1.0, 2.0, 20.0}) {
         const HasimotoSplit split(xi);
-        const double exact =
-            (-std::expm1(-4*xi*xi))/(4*root*xi) + std::erfc(2*xi); // (A4) of Fiore et al. 2017
+        const double exact = (-std::expm1(-4 * xi * xi)) / (4 * root * xi) +
+                             std::erfc(2 * xi); // (A4) of Fiore et al. 2017
         EXPECT_NEAR(split.realSelf(), exact, 1e-12) << xi;
         EXPECT_NEAR(split.realScalars(0).F, exact, 1e-12);
         EXPECT_NEAR(split.realScalars(0).G, exact, 1e-12);
@@ -224,7 +224,7 @@ TEST(Split, RealScalarsDecayAsAGaussianBeyondContact) {
     for (double xi : {1e-3, 0.05, 0.5, 1.0, 2.0, 20.0}) {
         const HasimotoSplit split(xi);
         for (double y = 0; y <= 8; y += 0.05) {
-            const PairScalars s = split.realScalars(std::min(2 + y/xi, split.maxDistance()));
+            const PairScalars s = split.realScalars(std::min(2 + y / xi, split.maxDistance()));
             EXPECT_LT(std::fabs(s.F), std::exp(-y * y) + 1e-12) << xi << " " << y;
             EXPECT_LT(std::fabs(s.G), std::exp(-y * y) + 1e-12) << xi << " " << y;
         }
@@ -235,11 +235,11 @@ TEST(Split, FullWaveWeightGivesBackRpy) {
     // With a narrow real half, RPY itself must follow from (3/pi) Int sinc^2 [..] dk. Of the real
     // half nothing is left beyond contact; in overlap the algebraic terms of (A2), (A3) are: F =
     // -3/(128 xi^4 r^3) = -G/2.
-    const double xi = 20, tail = 3/(128*xi*xi*xi*xi);
+    const double xi = 20, tail = 3 / (128 * xi * xi * xi * xi);
     const HasimotoSplit split(xi);
     for (double r : {0.5, 1.0, 1.6}) {
-        EXPECT_NEAR(split.realScalars(r).F, -tail/(r*r*r), 1e-12) << r;
-        EXPECT_NEAR(split.realScalars(r).G, 2*tail/(r*r*r), 1e-12) << r;
+        EXPECT_NEAR(split.realScalars(r).F, -tail / (r * r * r), 1e-12) << r;
+        EXPECT_NEAR(split.realScalars(r).G, 2 * tail / (r * r * r), 1e-12) << r;
     }
     const HasimotoSplit wide(5);
     for (double r : {3.2, 3.4, 3.6}) {
@@ -253,9 +253,9 @@ TEST(Split, BothHalvesAreNonNegativeModeByMode) {
         const HasimotoSplit split(xi);
         EXPECT_EQ(split.waveWeight(0), 1);
         for (int i = 0; i <= 20000; i++) {
-            const double k = 15*xi*i/20000, sinc = (k == 0 ? 1 : std::sin(k)/k);
+            const double k = 15 * xi * i / 20000, sinc = (k == 0 ? 1 : std::sin(k) / k);
             ASSERT_GE(split.waveWeight(k), 0);
-            ASSERT_GE(sinc*sinc - split.waveWeight(k), -1e-15)
+            ASSERT_GE(sinc * sinc - split.waveWeight(k), -1e-15)
                 << xi << " " << k; // rounding of the difference
         }
     }
@@ -272,11 +272,11 @@ TEST(Split, RealHalfIsPositiveForOverlappingParticles) {
         for (Vec3& p : x)
             p = Vec3(uniform(random), uniform(random), uniform(random));
         x[1] = x[0] + Vec3(0.01, 0, 0);
-        Eigen::MatrixXd M(3*n, 3*n);
+        Eigen::MatrixXd M(3 * n, 3 * n);
         for (int i = 0; i < n; i++)
             for (int j = 0; j < n; j++) {
                 const double r = std::min((x[i] - x[j]).norm(), split.maxDistance());
-                M.block<3, 3>(3*i, 3*j) = tensor(split.realScalars(r), x[i] - x[j]);
+                M.block<3, 3>(3 * i, 3 * j) = tensor(split.realScalars(r), x[i] - x[j]);
             }
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(M, Eigen::EigenvaluesOnly);
         EXPECT_GT(eigen.eigenvalues()[0], 0) << xi;
@@ -286,7 +286,7 @@ TEST(Split, RealHalfIsPositiveForOverlappingParticles) {
 TEST(Split, PeriodicSelfMobilityIsTheExactSeries) {
     for (double L : {2.2, 4.0, 10.0})
         for (double xi : {0.6, 1.1}) {
-            const double exact = 1 - 2.8372974794806/L + 4*M_PI/3/(L*L*L);
+            const double exact = 1 - 2.8372974794806 / L + 4 * M_PI / 3 / (L * L * L);
             const Matrix3 M =
                 periodicTensor(HasimotoSplit(xi), xi, Lattice::orthorhombic(L, L, L), Vec3::Zero());
             EXPECT_LT((M - exact * Matrix3::Identity()).norm(), 1e-11) << L << " " << xi;
@@ -295,16 +295,16 @@ TEST(Split, PeriodicSelfMobilityIsTheExactSeries) {
 
 TEST(Split, PeriodicSelfMobilityOfCentredLatticesHasHasimotosConstants) {
     const double d = 3.5, s = std::sqrt(2.0), t = std::sqrt(6.0);
-    const Lattice bcc(Vec3(d, 0, 0), Vec3(d/3, 2*s/3*d, 0),
-                      Vec3(-d/3, s/3*d, t/3*d));
-    const Lattice fcc(Vec3(d, 0, 0), Vec3(0, d, 0), Vec3(d/2, d/2, s/2*d));
+    const Lattice bcc(Vec3(d, 0, 0), Vec3(d / 3, 2 * s / 3 * d, 0),
+                      Vec3(-d / 3, s / 3 * d, t / 3 * d));
+    const Lattice fcc(Vec3(d, 0, 0), Vec3(0, d, 0), Vec3(d / 2, d / 2, s / 2 * d));
     for (double xi : {0.6, 1.0}) {
-        const double phiB = 4*M_PI/3/bcc.volume(), phiF = 4*M_PI/3/fcc.volume();
+        const double phiB = 4 * M_PI / 3 / bcc.volume(), phiF = 4 * M_PI / 3 / fcc.volume();
         const Matrix3 B = periodicTensor(HasimotoSplit(xi), xi, bcc, Vec3::Zero());
         const Matrix3 F = periodicTensor(HasimotoSplit(xi), xi, fcc, Vec3::Zero());
-        EXPECT_LT((B - (1 - 1.7918585114*std::cbrt(phiB) + phiB)*Matrix3::Identity()).norm(),
+        EXPECT_LT((B - (1 - 1.7918585114 * std::cbrt(phiB) + phiB) * Matrix3::Identity()).norm(),
                   1e-9);
-        EXPECT_LT((F - (1 - 1.7917472304*std::cbrt(phiF) + phiF)*Matrix3::Identity()).norm(),
+        EXPECT_LT((F - (1 - 1.7917472304 * std::cbrt(phiF) + phiF) * Matrix3::Identity()).norm(),
                   1e-9);
     }
 }
@@ -332,7 +332,7 @@ TEST(Split, RefusesNothingItCanDoAtTheEnds) {
             EXPECT_LE(rc, split.maxDistance());
             EXPECT_LE(split.realTruncation(rc, 0.3), error);
             EXPECT_LE(split.waveTruncation(kc, 0.3), error);
-            EXPECT_LT(kc, 13*xi);
+            EXPECT_LT(kc, 13 * xi);
         }
     }
 }
@@ -347,13 +347,14 @@ TEST(RealTable, FitsWithinTheErrorAskedFor) {
             const RealTable table = makeRealTable(split, rc, maxError);
             EXPECT_EQ(table.rc, rc);
             EXPECT_NEAR(table.self, split.realSelf(), maxError);
-            EXPECT_EQ(table.self, table(0).F); // no relative mobility of two particles at one place
+            // no relative mobility of two particles at one place
+            EXPECT_EQ(table.self, table(0).F);
             double worst = 0;
             for (int i = 0; i <= 700; i++) {
-                const double r = rc*i/700.0, t = 2*r*r/(rc*rc) - 1;
+                const double r = rc * i / 700.0, t = 2 * r * r / (rc * rc) - 1;
                 const SmoothScalars wave = split.waveScalars(r);
                 worst = maximum(worst, std::fabs(table.F(t) - wave.F),
-                                rc*rc*std::fabs(table.C(t) - wave.C));
+                                rc * rc * std::fabs(table.C(t) - wave.C));
             }
             EXPECT_LE(worst, maxError)
                 << "xi " << c[0] << " rc " << rc << " degree " << table.F.degree();
@@ -364,13 +365,13 @@ TEST(RealTable, FitsWithinTheErrorAskedFor) {
 TEST(RealTable, ScalarsAreThoseOfTheSplit) {
     for (double xi : {0.3, 1.0}) {
         const HasimotoSplit split(xi);
-        const double rc = 5/xi;
+        const double rc = 5 / xi;
         const RealTable table = makeRealTable(split, rc, 1e-11);
         for (double r : {1e-6, 0.1, 1.0, 1.99, 2.0, 2.01, 3.0, rc}) {
             const PairScalars exact = split.realScalars(r);
             const SmoothScalars s = table(r);
             EXPECT_NEAR(s.F, exact.F, 1e-11) << r;
-            EXPECT_NEAR(s.F + s.C*r*r, exact.G, 2e-11) << r; // one error from each polynomial
+            EXPECT_NEAR(s.F + s.C * r * r, exact.G, 2e-11) << r; // one error from each polynomial
         }
         EXPECT_EQ(table(0).C, 0);
         EXPECT_NEAR(table(0).F, split.realSelf(), 1e-11);
@@ -381,11 +382,11 @@ TEST(RealTable, ScalarsAreThoseOfTheSplit) {
 template <class Real> double hornerError(const Polynomial& p, const Split& split, double rc) {
     double worst = 0;
     for (int i = 0; i <= 500; i++) {
-        const Real t = Real(i/250.0 - 1);
+        const Real t = Real(i / 250.0 - 1);
         Real sum = Real(p.powers[p.degree()]);
         for (int n = p.degree() - 1; n >= 0; n--)
-            sum = sum*t + Real(p.powers[n]);
-        const double r = rc*std::sqrt(0.5*(1 + double(t)));
+            sum = sum * t + Real(p.powers[n]);
+        const double r = rc * std::sqrt(0.5 * (1 + double(t)));
         worst = std::max(worst, std::fabs(double(sum) - split.waveScalars(r).F));
     }
     return worst;
@@ -395,18 +396,18 @@ TEST(RealTable, PowersServeHornersRule) {
     for (double xi : {0.1, 0.5, 1.0, 2.0}) {
         const HasimotoSplit split(xi);
         for (double maxError : {1e-3, 1e-5, 1e-6}) {
-            for (double rc : {split.realCutoff(20*maxError, 0.3), 6/xi}) {
+            for (double rc : {split.realCutoff(20 * maxError, 0.3), 6 / xi}) {
                 const RealTable table = makeRealTable(split, rc, maxError);
                 EXPECT_LE(hornerError<float>(table.F, split, rc), maxError + 5e-7)
-                    << xi << " " << maxError << " " << xi*rc;
+                    << xi << " " << maxError << " " << xi * rc;
             }
         }
         // The last error belongs to tolerance 1e-10, the tightest there is.
         for (double maxError : {1e-3, 1e-8, 2.5e-12}) {
-            for (double rc : {split.realCutoff(20*maxError, 0.3), 8/xi}) {
+            for (double rc : {split.realCutoff(20 * maxError, 0.3), 8 / xi}) {
                 const RealTable table = makeRealTable(split, rc, maxError);
                 EXPECT_LE(hornerError<double>(table.F, split, rc), maxError + 1e-12)
-                    << xi << " " << maxError << " " << xi*rc;
+                    << xi << " " << maxError << " " << xi * rc;
             }
         }
     }

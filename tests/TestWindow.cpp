@@ -22,18 +22,18 @@ const double SHAPES[][2] = {{3, 5.3},  {4, 6.28}, {4, 7.6},   {5, 9.9}, {6, 12.2
 
 /** I0 by its power series, all terms positive: relative error about 1e-18. */
 long double besselI0(long double x) {
-    const long double quarter = x*x/4;
+    const long double quarter = x * x / 4;
     long double term = 1, sum = 1;
-    for (int n = 1; term > 1e-22L*sum; n++) {
-        term *= quarter/((long double)n*n);
+    for (int n = 1; term > 1e-22L * sum; n++) {
+        term *= quarter / ((long double)n * n);
         sum += term;
     }
     return sum;
 }
 
 long double windowReference(int P, long double beta, long double x) {
-    const long double z = 2*x/P;
-    return besselI0(beta*std::sqrt(std::max(0.0L, 1 - z*z)))/besselI0(beta);
+    const long double z = 2 * x / P;
+    return besselI0(beta * std::sqrt(std::max(0.0L, 1 - z * z))) / besselI0(beta);
 }
 
 /**
@@ -41,12 +41,12 @@ long double windowReference(int P, long double beta, long double x) {
  * step of the window at its edges; absolute error below 1e-16 P.
  */
 double transformReference(int P, double beta, double theta) {
-    const long double step = 1.0L/64;
+    const long double step = 1.0L / 64;
     long double sum = 0;
-    for (int i = -64*4; i <= 64*4; i++) {
-        const long double t = i*step, s = PI/2*std::sinh(t), x = 0.5L*P*std::tanh(s);
-        const long double weight = 0.5L*P*PI/2*std::cosh(t)/(std::cosh(s)*std::cosh(s));
-        sum += step*weight*windowReference(P, beta, x)*std::cos(theta*x);
+    for (int i = -64 * 4; i <= 64 * 4; i++) {
+        const long double t = i * step, s = PI / 2 * std::sinh(t), x = 0.5L * P * std::tanh(s);
+        const long double weight = 0.5L * P * PI / 2 * std::cosh(t) / (std::cosh(s) * std::cosh(s));
+        sum += step * weight * windowReference(P, beta, x) * std::cos(theta * x);
     }
     return double(sum);
 }
@@ -54,7 +54,7 @@ double transformReference(int P, double beta, double theta) {
 template <class Real> Real horner(const Polynomial& p, Real t) {
     Real sum = Real(p.powers[p.degree()]);
     for (int n = p.degree() - 1; n >= 0; n--)
-        sum = sum*t + Real(p.powers[n]);
+        sum = sum * t + Real(p.powers[n]);
     return sum;
 }
 
@@ -63,15 +63,15 @@ template <class Real> Real horner(const Polynomial& p, Real t) {
 TEST(Quadrature, IsExactForPolynomialsOfDegree2nMinus1) {
     for (int n : {1, 2, 3, 8, 24, 64}) {
         const Quadrature rule = gaussLegendre(n, -1, 1);
-        for (int degree = 0; degree < 2*n; degree++) {
+        for (int degree = 0; degree < 2 * n; degree++) {
             double sum = 0;
             for (int i = 0; i < n; i++)
-                sum += rule.weights[i]*std::pow(rule.nodes[i], degree);
+                sum += rule.weights[i] * std::pow(rule.nodes[i], degree);
             ASSERT_NEAR(sum, degree % 2 == 0 ? 2.0 / (degree + 1) : 0, 2e-14) << n << " " << degree;
         }
         double sum = 0;
         for (int i = 0; i < n; i++)
-            sum += rule.weights[i]*std::pow(rule.nodes[i], 2*n);
+            sum += rule.weights[i] * std::pow(rule.nodes[i], 2 * n);
         if (n < 9) {
             EXPECT_GT(2.0 / (2 * n + 1) - sum, 1e-6) << "one degree more cannot be exact";
         }
@@ -80,32 +80,32 @@ TEST(Quadrature, IsExactForPolynomialsOfDegree2nMinus1) {
 
 TEST(Quadrature, NodesOfSmallRulesAreTheClosedForms) {
     const Quadrature two = gaussLegendre(2, 3, 5), three = gaussLegendre(3, -1, 1);
-    EXPECT_DOUBLE_EQ(two.nodes[0], 4 - 1/std::sqrt(3.0));
-    EXPECT_DOUBLE_EQ(two.nodes[1], 4 + 1/std::sqrt(3.0));
+    EXPECT_DOUBLE_EQ(two.nodes[0], 4 - 1 / std::sqrt(3.0));
+    EXPECT_DOUBLE_EQ(two.nodes[1], 4 + 1 / std::sqrt(3.0));
     EXPECT_DOUBLE_EQ(two.weights[0], 1);
     EXPECT_NEAR(three.nodes[0], -std::sqrt(0.6), 1e-15);
-    EXPECT_NEAR(three.weights[1], 8.0/9, 1e-15);
+    EXPECT_NEAR(three.weights[1], 8.0 / 9, 1e-15);
 }
 
 TEST(Quadrature, LargeRulesResolveOscillations) {
     // A rule of n nodes resolves cos(k x) on an interval of length L once n > k L/2.
     for (int n : {200, 1000}) {
-        const double length = 3, k = 1.7*n/length;
+        const double length = 3, k = 1.7 * n / length;
         const Quadrature rule = gaussLegendre(n, 0, length);
         double sum = 0, total = 0;
         for (int i = 0; i < n; i++) {
-            sum += rule.weights[i]*std::cos(k*rule.nodes[i]);
+            sum += rule.weights[i] * std::cos(k * rule.nodes[i]);
             total += rule.weights[i];
             ASSERT_GT(rule.nodes[i], i == 0 ? 0 : rule.nodes[i - 1]);
             ASSERT_GT(rule.weights[i], 0);
         }
-        EXPECT_NEAR(sum, std::sin(k*length)/k, 1e-13);
+        EXPECT_NEAR(sum, std::sin(k * length) / k, 1e-13);
         EXPECT_NEAR(total, length, 1e-12);
     }
 }
 
 TEST(Chebyshev, BothBasesGiveBackAPolynomial) {
-    const auto f = [](double t) { return 3 - 2*t + 0.5*t*t*t - t*t*t*t*t; };
+    const auto f = [](double t) { return 3 - 2 * t + 0.5 * t * t * t - t * t * t * t * t; };
     const Polynomial p = fitPolynomial(f, 7);
     const double exact[] = {3, -2, 0, 0.5, 0, -1, 0, 0};
     ASSERT_EQ(p.degree(), 7);
@@ -119,7 +119,7 @@ TEST(Chebyshev, BothBasesGiveBackAPolynomial) {
 }
 
 TEST(Chebyshev, PicksTheLowestDegreeThatKeepsTheError) {
-    const auto f = [](double t) { return std::exp(2*t); };
+    const auto f = [](double t) { return std::exp(2 * t); };
     for (double maxError : {1e-2, 1e-5, 1e-9, 1e-13}) {
         const Polynomial p = fitPolynomial(f, maxError, 2, 40);
         double worst = 0, lower = 0;
@@ -131,7 +131,7 @@ TEST(Chebyshev, PicksTheLowestDegreeThatKeepsTheError) {
         EXPECT_LT(worst, maxError + 1e-14);
         EXPECT_GT(
             lower,
-            0.4*maxError); // one degree less would not do, but for the factor of interpolation
+            0.4 * maxError); // one degree less would not do, but for the factor of interpolation
     }
 }
 
@@ -147,10 +147,10 @@ TEST(Window, IsTheRatioOfBesselFunctions) {
         const int P = int(s[0]);
         const Window window(P, s[1]);
         EXPECT_EQ(window(0), 1);
-        EXPECT_EQ(window(0.5*P + 1e-9), 0);
-        EXPECT_EQ(window(-0.5*P - 1e-9), 0);
+        EXPECT_EQ(window(0.5 * P + 1e-9), 0);
+        EXPECT_EQ(window(-0.5 * P - 1e-9), 0);
         for (int i = -50; i <= 50; i++) {
-            const double x = 0.5*P*i/50;
+            const double x = 0.5 * P * i / 50;
             ASSERT_NEAR(window(x), double(windowReference(P, s[1], x)), 1e-14) << P << " " << x;
         }
     }
@@ -161,7 +161,7 @@ TEST(Window, TransformIsTheFourierIntegralOfTheTruncatedWindow) {
         const int P = int(s[0]);
         const Window window(P, s[1]);
         for (double theta :
-             {0.0, 0.1, 0.7, 1.5, 2.5, 3.0, M_PI, 2*s[1]/P, 4.0, 6.3, 12.0, 20.0}) {
+             {0.0, 0.1, 0.7, 1.5, 2.5, 3.0, M_PI, 2 * s[1] / P, 4.0, 6.3, 12.0, 20.0}) {
             const double exact = transformReference(P, s[1], theta);
             ASSERT_NEAR(window.transform(theta), exact, 1e-13) << P << " " << theta;
             if (theta <= M_PI) { // inside the band it is divided by: relative error
@@ -174,10 +174,10 @@ TEST(Window, TransformIsTheFourierIntegralOfTheTruncatedWindow) {
 
 TEST(Window, TransformIsSmoothWhereTheHyperbolicSineTurnsIntoTheSine) {
     const Window window(6, 12.2);
-    const double edge = 2*12.2/6;
+    const double edge = 2 * 12.2 / 6;
     double previous = window.transform(edge - 1e-5);
     for (int i = -99; i <= 100; i++) {
-        const double value = window.transform(edge + 1e-7*i);
+        const double value = window.transform(edge + 1e-7 * i);
         ASSERT_NEAR(value, previous, 1e-9);
         ASSERT_LE(value, previous);
         previous = value;
@@ -187,25 +187,25 @@ TEST(Window, TransformIsSmoothWhereTheHyperbolicSineTurnsIntoTheSine) {
 TEST(Window, MinShapeKeepsTheZerosOutsideTheNyquistBand) {
     for (int P = 2; P <= 16; P++) {
         const double beta = Window::minShape(P);
-        const Window least(P, beta), smaller(P, 0.5*beta);
+        const Window least(P, beta), smaller(P, 0.5 * beta);
         double lowest = least.transform(0), lowestOfSmaller = lowest;
         for (int i = 0; i <= 2000; i++) {
-            const double theta = M_PI*i/2000;
+            const double theta = M_PI * i / 2000;
             ASSERT_GT(least.transform(theta), 0);
-            lowest = std::min(lowest, least.transform(theta)/least.transform(0));
+            lowest = std::min(lowest, least.transform(theta) / least.transform(0));
             lowestOfSmaller = std::min(lowestOfSmaller, smaller.transform(theta));
         }
         // At the edge of the band q is 0.05 P or less: the transform is P/I0(beta), its peak P
         // sinh(beta)/(beta I0(beta)).
-        EXPECT_GT(lowest, 0.8*beta/std::sinh(beta)) << P;
+        EXPECT_GT(lowest, 0.8 * beta / std::sinh(beta)) << P;
         if (P >= 3) {
             EXPECT_LT(lowestOfSmaller, 0)
                 << "half of minShape must fail, or this test proves nothing";
         }
         // The first zero: q = i pi, theta = 2 sqrt(beta^2 + pi^2)/P.
-        const double zero = 2*std::sqrt(beta*beta + M_PI*M_PI)/P;
+        const double zero = 2 * std::sqrt(beta * beta + M_PI * M_PI) / P;
         EXPECT_GT(zero, M_PI);
-        EXPECT_NEAR(least.transform(zero), 0, 1e-14*P);
+        EXPECT_NEAR(least.transform(zero), 0, 1e-14 * P);
     }
 }
 
@@ -216,18 +216,18 @@ TEST(Window, AliasingIsTheSumOverAllAliases) {
                exact =
                    0; // mean over the band with the weight of the self mobility, 1/k^2 times k^2
         for (int i = 0; i <= 24; i++) {
-            const double theta = 0.8*M_PI*i/24;
+            const double theta = 0.8 * M_PI * i / 24;
             double sum = 0;
             for (int p = -200; p <= 200; p++)
                 if (p != 0)
                     sum += std::pow(
-                        window.transform(theta + 2*M_PI*p)/window.transform(theta), 2);
+                        window.transform(theta + 2 * M_PI * p) / window.transform(theta), 2);
             measured += window.aliasing(theta);
             exact += sum;
-            EXPECT_LE(window.aliasing(theta), sum*(1 + 1e-12));
+            EXPECT_LE(window.aliasing(theta), sum * (1 + 1e-12));
             EXPECT_GE(window.aliasing(theta), 0.75 * sum) << s[0] << " " << theta;
         }
-        EXPECT_NEAR(measured/exact, 1, 0.02) << s[0];
+        EXPECT_NEAR(measured / exact, 1, 0.02) << s[0];
         EXPECT_NEAR(window.aliasing(M_PI), 1,
                     0.01); // the Nyquist wave and its alias are one and the same
     }
@@ -242,13 +242,13 @@ TEST(Window, PolynomialsGiveTheWindowOnEveryGridPoint) {
             ASSERT_EQ(int(pieces.size()), P);
             double worst = 0, worstFloat = 0;
             for (int i = 0; i <= 400; i++) {
-                const double u = 7 + i/400.0; // a particle at u touches i0 ... i0 + P - 1
-                const double i0 = std::ceil(u - 0.5*P), t = 2*(i0 - u) + P - 1;
+                const double u = 7 + i / 400.0; // a particle at u touches i0 ... i0 + P - 1
+                const double i0 = std::ceil(u - 0.5 * P), t = 2 * (i0 - u) + P - 1;
                 ASSERT_LE(std::fabs(t), 1);
                 for (int j = 0; j < P; j++) {
                     ASSERT_EQ(pieces[j].degree(), pieces[0].degree());
                     const double exact =
-                        double(windowReference(P, s[1], std::min(0.5*P, i0 + j - u)));
+                        double(windowReference(P, s[1], std::min(0.5 * P, i0 + j - u)));
                     worst = std::max(worst, std::fabs(pieces[j](t) - exact));
                     worst = std::max(worst, std::fabs(horner(pieces[j], t) - exact));
                     worstFloat =

@@ -11,27 +11,35 @@ namespace PSE {
 
 namespace {
 
-constexpr double LARGE_STEP = 0.3;                   ///< rms displacement per step over a that is flagged
+/// rms displacement per step over a that is flagged
+constexpr double LARGE_STEP = 0.3;
 
 void describeFluid(std::ostream& out, const PSEBrownianIntegrator& integrator, double a) {
-    const double kT = KT_PER_KELVIN*integrator.getTemperature(), eta = integrator.getViscosity(), dt = integrator.getStepSize();
-    const double d0 = kT/(6*M_PI*eta*a); // nm^2/ps
-    const double rms = std::sqrt(6*d0*dt)/a;
-    out << "solvent: temperature " << integrator.getTemperature() << " K, viscosity " << eta << " Da/(nm ps) = "
-        << eta*MPAS_PER_MD_VISCOSITY << " mPa s" << endl;
-    out << "single particle: radius a = " << a << " nm, D0 = kT/(6 pi eta a) = " << 1000*d0 << " nm^2/ns = " << 1e-6*d0
-        << " m^2/s" << endl;
-    out << "step: dt = " << dt << " ps, dt D0/a^2 = " << dt*d0/(a*a) << ", rms displacement per step " << rms << " a" << endl;
+    const double kT = KT_PER_KELVIN * integrator.getTemperature(), eta = integrator.getViscosity(),
+                 dt = integrator.getStepSize();
+    const double d0 = kT / (6 * M_PI * eta * a); // nm^2/ps
+    const double rms = std::sqrt(6 * d0 * dt) / a;
+    out << "solvent: temperature " << integrator.getTemperature() << " K, viscosity " << eta
+        << " Da/(nm ps) = " << eta * MPAS_PER_MD_VISCOSITY << " mPa s" << endl;
+    out << "single particle: radius a = " << a << " nm, D0 = kT/(6 pi eta a) = " << 1000 * d0
+        << " nm^2/ns = " << 1e-6 * d0 << " m^2/s" << endl;
+    out << "step: dt = " << dt << " ps, dt D0/a^2 = " << dt * d0 / (a * a)
+        << ", rms displacement per step " << rms << " a" << endl;
     if (rms > LARGE_STEP)
         out << "WARNING: the rms displacement per step of " << rms << " a exceeds " << LARGE_STEP
-            << " a; use a smaller step size, or check the viscosity (water has 603 Da/(nm ps) = 1.002 mPa s at 20 C)" << endl;
+            << " a; use a smaller step size, or check the viscosity (water has 603 Da/(nm ps) = "
+               "1.002 mPa s at 20 C)"
+            << endl;
 }
 
-void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator, const NumericalParameters& p) {
-    out << "numerics: tolerance " << integrator.getErrorTolerance() << ", predicted error " << p.predictedError << ", " << p.split
-        << " split, xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid " << p.gridDimensions[0] << " x "
-        << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support " << p.windowSupport << ", Lanczos tolerance "
-        << p.lanczosTolerance << ", " << p.precision << " precision" << endl;
+void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator,
+                      const NumericalParameters& p) {
+    out << "numerics: tolerance " << integrator.getErrorTolerance() << ", predicted error "
+        << p.predictedError << ", " << p.split << " split, xi = " << p.xi
+        << " /nm, real-space cutoff " << p.realCutoff << " nm, grid " << p.gridDimensions[0]
+        << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
+        << p.windowSupport << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision
+        << " precision" << endl;
 }
 
 void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
@@ -45,7 +53,7 @@ void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
     out << "cost of the steps so far, without the Forces:" << std::fixed << std::setprecision(0);
     const char* separator = " ";
     for (const StageTime& stage : stages) {
-        out << separator << stage.stage << " " << 100*stage.seconds/total << " %";
+        out << separator << stage.stage << " " << 100 * stage.seconds / total << " %";
         separator = ", ";
     }
     out << endl;
@@ -54,7 +62,8 @@ void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
 
 } // namespace
 
-std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator, const NumericalParameters& parameters,
+std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator,
+                          const NumericalParameters& parameters,
                           const std::vector<StageTime>& stages) {
     std::ostringstream out;
     out << std::setprecision(4);
@@ -63,7 +72,8 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
         out << "hydrodynamic interactions: on (" << scene.modelReason << ")" << endl
             << "fluid: periodic in the box of the Context, " << scene.boundaryReason << endl;
     else
-        out << "hydrodynamic interactions: off (" << scene.modelReason << "), M = 1/(6 pi eta a)" << endl;
+        out << "hydrodynamic interactions: off (" << scene.modelReason << "), M = 1/(6 pi eta a)"
+            << endl;
     if (integrator.getTemperature() > 0)
         out << "thermal noise: on (temperature above 0), seed " << parameters.randomSeed << endl;
     else

@@ -41,7 +41,8 @@ void requireInRange(const char* name, double value, double low, double high) {
 
 } // namespace
 
-PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosity, double radius, double stepSize) {
+PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosity, double radius,
+                                             double stepSize) {
     setTemperature(temperature);
     setViscosity(viscosity);
     setRadius(radius);
@@ -51,19 +52,22 @@ PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosit
 
 void PSEBrownianIntegrator::requireUnbound(const char* setter) const {
     if (context != NULL)
-        refuse(string(setter) + " was called after a Context had been created; what it sets is fixed from then on. "
+        refuse(string(setter) +
+               " was called after a Context had been created; what it sets is fixed from then on. "
                "Set it before, or make a copy of the integrator and a new Context");
 }
 
 void PSEBrownianIntegrator::requireBound(const char* method) const {
     if (context == NULL)
-        refuse(string(method) + " needs a Context: this integrator is not bound to a context! Create one first");
+        refuse(string(method) +
+               " needs a Context: this integrator is not bound to a context! Create one first");
 }
 
 void PSEBrownianIntegrator::requirePositions(const char* method) const {
     requireBound(method);
     if (!positionsSet)
-        refuse(string(method) + " needs positions, and none have been set; call Context.setPositions first");
+        refuse(string(method) +
+               " needs positions, and none have been set; call Context.setPositions first");
 }
 
 void PSEBrownianIntegrator::setTemperature(double value) {
@@ -131,7 +135,8 @@ void PSEBrownianIntegrator::setShearRate(double rate) {
     }
     if (context != NULL && rate != 0) {
         std::ostringstream message;
-        message << "setShearRate(" << rate << "): shear flow is not available; leave the shear rate at 0";
+        message << "setShearRate(" << rate
+                << "): shear flow is not available; leave the shear rate at 0";
         refuse(message.str());
     }
     shearRate = rate;
@@ -175,9 +180,11 @@ void PSEBrownianIntegrator::setWindowSupport(int support) {
 
 void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& parameters) {
     requireUnbound("setNumericalParameters");
-    PSEBrownianIntegrator trial(temperature, viscosity, radius, getStepSize()); // validates before anything is changed
+    // validates before anything is changed
+    PSEBrownianIntegrator trial(temperature, viscosity, radius, getStepSize());
     trial.setSplittingParameter(parameters.xi);
-    trial.setGridDimensions(parameters.gridDimensions[0], parameters.gridDimensions[1], parameters.gridDimensions[2]);
+    trial.setGridDimensions(parameters.gridDimensions[0], parameters.gridDimensions[1],
+                            parameters.gridDimensions[2]);
     trial.setWindowSupport(parameters.windowSupport);
     if (parameters.realCutoff != 0)
         requirePositive("realCutoff", parameters.realCutoff, "nm");
@@ -190,7 +197,8 @@ void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& pa
     else if (parameters.split == "Prolate")
         split = Prolate;
     else if (parameters.split != "" && parameters.split != "none")
-        refuse("split is '" + parameters.split + "'; it must be 'Hasimoto', 'Prolate', 'none' or empty");
+        refuse("split is '" + parameters.split +
+               "'; it must be 'Hasimoto', 'Prolate', 'none' or empty");
     requested = trial.requested;
     requested.realCutoff = parameters.realCutoff;
     requested.windowShape = parameters.windowShape;
@@ -208,7 +216,8 @@ void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
     if (owner != NULL && &contextRef.getOwner() != owner)
         throw OpenMMException("This Integrator is already bound to a context");
     const Scene seen = makeScene(contextRef.getSystem(), *this);
-    Kernel created = contextRef.getPlatform().createKernel(IntegratePSEStepKernel::Name(), contextRef);
+    Kernel created =
+        contextRef.getPlatform().createKernel(IntegratePSEStepKernel::Name(), contextRef);
     created.getAs<IntegratePSEStepKernel>().initialize(contextRef, *this, seen);
     kernel = created;
     positionsSet = false;
@@ -222,7 +231,8 @@ void PSEBrownianIntegrator::stateChanged(State::DataType changed) {
 }
 
 void PSEBrownianIntegrator::cleanup() {
-    // Without a Context nothing here is in use: settings may be changed again, and another Context may be created.
+    // Without a Context nothing here is in use: settings may be changed again, and another Context
+    // may be created.
     kernel = Kernel();
     context = NULL;
     owner = NULL;
@@ -262,11 +272,13 @@ vector<Vec3> PSEBrownianIntegrator::sampleBrownianDisplacements(int count) {
     requirePositions("sampleBrownianDisplacements");
     if (count < 0) {
         std::ostringstream message;
-        message << "sampleBrownianDisplacements was asked for " << count << " samples; the count cannot be negative";
+        message << "sampleBrownianDisplacements was asked for " << count
+                << " samples; the count cannot be negative";
         refuse(message.str());
     }
     kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
-    return kernel.getAs<IntegratePSEStepKernel>().sampleBrownianDisplacements(*context, *this, count);
+    return kernel.getAs<IntegratePSEStepKernel>().sampleBrownianDisplacements(*context, *this,
+                                                                              count);
 }
 
 NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
@@ -277,7 +289,8 @@ NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
 string PSEBrownianIntegrator::describe() const {
     requireBound("describe");
     const IntegratePSEStepKernel& step = kernel.getAs<const IntegratePSEStepKernel>();
-    return describeScene(makeScene(context->getSystem(), *this), *this, step.getNumericalParameters(), step.getStageTimes());
+    return describeScene(makeScene(context->getSystem(), *this), *this,
+                         step.getNumericalParameters(), step.getStageTimes());
 }
 
 void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
@@ -300,13 +313,16 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
     if (node.getProperties().empty() && node.getChildren().empty())
         return; // the State of an integrator that has no parameters: nothing to continue
     if (!node.hasProperty("noiseStep"))
-        refuse("the State holds the parameters of another integrator; save it without integrator parameters, or load it "
+        refuse("the State holds the parameters of another integrator; save it without integrator "
+               "parameters, or load it "
                "with the integrator that wrote it");
     if (node.getIntProperty("version") != 1)
-        refuse("the integrator parameters in this State have version " + std::to_string(node.getIntProperty("version")) +
+        refuse("the integrator parameters in this State have version " +
+               std::to_string(node.getIntProperty("version")) +
                "; this version of openmmpse reads version 1");
-    kernel.getAs<IntegratePSEStepKernel>().setCounters(std::stoull(node.getStringProperty("noiseStep")),
-                                                       std::stoull(node.getStringProperty("noiseSample")));
+    kernel.getAs<IntegratePSEStepKernel>().setCounters(
+        std::stoull(node.getStringProperty("noiseStep")),
+        std::stoull(node.getStringProperty("noiseSample")));
 }
 
 } // namespace PSE

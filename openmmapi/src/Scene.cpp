@@ -35,18 +35,21 @@ void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) 
         refuse("the System has no particles; add at least one with System.addParticle");
     if (system.getNumConstraints() > 0) {
         std::ostringstream message;
-        message << "the System has " << system.getNumConstraints() << " constraints, and constrained dynamics with hydrodynamics "
-                << "is not available; use stiff bonds instead (create the System with constraints=None, rigidWater=False)";
+        message << "the System has " << system.getNumConstraints()
+                << " constraints, and constrained dynamics with hydrodynamics "
+                << "is not available; use stiff bonds instead (create the System with "
+                   "constraints=None, rigidWater=False)";
         refuse(message.str());
     }
     for (int i = 0; i < system.getNumForces(); i++)
         if (const char* name = nameOfBarostat(system.getForce(i)))
-            refuse(string("the System has a ") + name + ", and boxes that a barostat moves are not available; remove that Force");
+            refuse(string("the System has a ") + name +
+                   ", and boxes that a barostat moves are not available; remove that Force");
     for (const auto& own : integrator.getParticleRadii())
         if (own.first >= system.getNumParticles()) {
             std::ostringstream message;
-            message << "setParticleRadius was called for particle " << own.first << "; the System has particles 0 to "
-                    << system.getNumParticles() - 1;
+            message << "setParticleRadius was called for particle " << own.first
+                    << "; the System has particles 0 to " << system.getNumParticles() - 1;
             refuse(message.str());
         }
 }
@@ -54,11 +57,13 @@ void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) 
 void checkSettings(const PSEBrownianIntegrator& integrator) {
     if (integrator.getShearRate() != 0) {
         std::ostringstream message;
-        message << "setShearRate(" << integrator.getShearRate() << "): shear flow is not available; leave the shear rate at 0";
+        message << "setShearRate(" << integrator.getShearRate()
+                << "): shear flow is not available; leave the shear rate at 0";
         refuse(message.str());
     }
     if (integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
-        refuse("setMobilityModel(ForceCoupling): this mobility is not available; use RotnePragerYamakawa or FreeDraining");
+        refuse("setMobilityModel(ForceCoupling): this mobility is not available; use "
+               "RotnePragerYamakawa or FreeDraining");
     if (integrator.getSplit() == PSEBrownianIntegrator::Prolate)
         refuse("setSplit(Prolate): this split is not available; use AutomaticSplit or Hasimoto");
 }
@@ -66,15 +71,18 @@ void checkSettings(const PSEBrownianIntegrator& integrator) {
 void checkBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {
     const auto boundary = integrator.getFluidBoundary();
     if (boundary == PSEBrownianIntegrator::Unbounded)
-        refuse("setFluidBoundary(Unbounded): an unbounded fluid is not available; use Periodic with a box that is large "
+        refuse("setFluidBoundary(Unbounded): an unbounded fluid is not available; use Periodic "
+               "with a box that is large "
                "against the molecule, or setMobilityModel(FreeDraining)");
     if (boundary == PSEBrownianIntegrator::Periodic)
         scene.boundaryReason = "as set by setFluidBoundary";
     else if (system.usesPeriodicBoundaryConditions())
         scene.boundaryReason = "because a Force uses periodic boundary conditions";
     else
-        refuse("setFluidBoundary(Automatic) means an unbounded fluid here, because no Force uses periodic boundary conditions, "
-               "and an unbounded fluid is not available; call setFluidBoundary(Periodic) for a fluid that is periodic in the "
+        refuse("setFluidBoundary(Automatic) means an unbounded fluid here, because no Force uses "
+               "periodic boundary conditions, "
+               "and an unbounded fluid is not available; call setFluidBoundary(Periodic) for a "
+               "fluid that is periodic in the "
                "System's box");
 }
 
@@ -82,9 +90,11 @@ void checkRadii(const Scene& scene) {
     for (size_t i = 0; i < scene.radii.size(); i++)
         if (scene.radii[i] != scene.radii[0]) {
             std::ostringstream message;
-            message << "setParticleRadius: particle " << scene.mobile[i] << " has radius " << scene.radii[i] << " nm, particle "
-                    << scene.mobile[0] << " has " << scene.radii[0] << " nm, and unequal radii are not available with "
-                    << "hydrodynamics; give all particles one radius, or use setMobilityModel(FreeDraining)";
+            message << "setParticleRadius: particle " << scene.mobile[i] << " has radius "
+                    << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has "
+                    << scene.radii[0] << " nm, and unequal radii are not available with "
+                    << "hydrodynamics; give all particles one radius, or use "
+                       "setMobilityModel(FreeDraining)";
             refuse(message.str());
         }
 }
@@ -103,13 +113,13 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
         scene.mobile.push_back(i);
         scene.radii.push_back(integrator.getParticleRadius(i));
     }
-    scene.hydrodynamics = (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
+    scene.hydrodynamics =
+        (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
     if (scene.hydrodynamics) {
         checkBoundary(system, integrator, scene);
         checkRadii(scene);
         scene.modelReason = "Rotne-Prager-Yamakawa, equal radii";
-    }
-    else
+    } else
         scene.modelReason = "setMobilityModel(FreeDraining) was called";
     return scene;
 }

@@ -9,14 +9,14 @@
 namespace PSE {
 
 /**
- * The periodic mobility on the CPU, in arrays of Real. Inside, forces are scaled by the largest of them (or by the force
- * whose Stokes velocity is the thermal one), lengths by the radius: any unit system fits single precision.
+ * The periodic mobility on the CPU, in arrays of Real. Inside, forces are scaled by the largest of
+ * them (or by the force whose Stokes velocity is the thermal one), lengths by the radius: any unit
+ * system fits single precision.
  */
-template <class Real>
-class CpuEngine : public MobilityEngine {
+template <class Real> class CpuEngine : public MobilityEngine {
 public:
-    CpuEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity, const std::vector<int>& indices,
-              OpenMM::ThreadPool& pool, StageClock& clock);
+    CpuEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+              const std::vector<int>& indices, OpenMM::ThreadPool& pool, StageClock& clock);
     void setPositions(const std::vector<numerics::Vec3>& x) override;
     void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
                            std::vector<numerics::Vec3>& u) override;
@@ -27,7 +27,7 @@ private:
     void addRealForced(const Vector& forces, Vector& u);
     void addRealThermal(const Thermal& thermal, Real noise, Vector& u);
 
-    double drag;                ///< 6 pi eta a
+    double drag; ///< 6 pi eta a
     double lanczosTolerance, negativeTolerance;
     bool reorthogonalise;
     std::vector<int> indices;

@@ -23,8 +23,9 @@ public:
         request.singleFloor = SINGLE_PRECISION_FLOOR;
         request.directSums = false;
     }
-    std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
-                                           const std::vector<int>& indices, StageClock& clock) const override {
+    std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box,
+                                           double viscosity, const std::vector<int>& indices,
+                                           StageClock& clock) const override {
         if (plan.precision == numerics::Precision::Single)
             return make<float>(plan, box, viscosity, indices, clock);
         return make<double>(plan, box, viscosity, indices, clock);
@@ -32,20 +33,24 @@ public:
 
 private:
     template <class Real>
-    std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
-                                         const std::vector<int>& indices, StageClock& clock) const {
+    std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box,
+                                         double viscosity, const std::vector<int>& indices,
+                                         StageClock& clock) const {
         requireMemory(plan, CpuWaveSpace<Real>::bytesPerGridPoint());
-        return std::unique_ptr<MobilityEngine>(new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
+        return std::unique_ptr<MobilityEngine>(
+            new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
     }
     ThreadPool& pool;
 };
 
 class CpuKernelFactory : public KernelFactory {
 public:
-    KernelImpl* createKernelImpl(std::string name, const Platform& platform, ContextImpl& context) const override {
+    KernelImpl* createKernelImpl(std::string name, const Platform& platform,
+                                 ContextImpl& context) const override {
         auto& data = *static_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
         ThreadPool& pool = CpuPlatform::getPlatformData(context).threads;
-        return new HostStepKernel(name, platform, data, std::unique_ptr<EngineFactory>(new CpuEngineFactory(pool)));
+        return new HostStepKernel(name, platform, data,
+                                  std::unique_ptr<EngineFactory>(new CpuEngineFactory(pool)));
     }
 };
 
@@ -53,11 +58,11 @@ public:
 
 } // namespace PSE
 
-extern "C" OPENMM_EXPORT void registerPlatforms() {
-}
+extern "C" OPENMM_EXPORT void registerPlatforms() {}
 
 extern "C" OPENMM_EXPORT void registerKernelFactories() {
     for (int i = 0; i < Platform::getNumPlatforms(); i++)
         if (Platform::getPlatform(i).getName() == "CPU")
-            Platform::getPlatform(i).registerKernelFactory(PSE::IntegratePSEStepKernel::Name(), new PSE::CpuKernelFactory());
+            Platform::getPlatform(i).registerKernelFactory(PSE::IntegratePSEStepKernel::Name(),
+                                                           new PSE::CpuKernelFactory());
 }

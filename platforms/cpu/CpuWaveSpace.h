@@ -11,11 +11,11 @@
 namespace PSE {
 
 /**
- * The wave-space half on a grid [T4, T9, T10]: spread by the Kaiser-Bessel window, transform, scale (forced and thermal
- * part together), transform back, gather. Mobilities in units of 1/(6 pi eta a).
+ * The wave-space half on a grid [T4, T9, T10]: spread by the Kaiser-Bessel window, transform, scale
+ * (forced and thermal part together), transform back, gather. Mobilities in units of 1/(6 pi eta
+ * a).
  */
-template <class Real>
-class CpuWaveSpace {
+template <class Real> class CpuWaveSpace {
 public:
     CpuWaveSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per grid point of everything that grows with the grid. */
@@ -26,7 +26,8 @@ public:
      * @param forces  [n][3], or NULL
      * @param noise   amplitude, 0 for none
      */
-    void addVelocities(const Real* forces, Real noise, const numerics::NoiseKey& key, Real* u, StageClock& clock);
+    void addVelocities(const Real* forces, Real noise, const numerics::NoiseKey& key, Real* u,
+                       StageClock& clock);
 
 private:
     using Complex = std::complex<Real>;
@@ -45,9 +46,10 @@ private:
     size_t rowLength, blockLength;
     std::vector<Real> windowCoefficients;
     std::unique_ptr<GridFft<Real>> fft;
-    FftArray<Real> grids[3];                    ///< [x][y][rowLength], real or complex
-    FftArray<Real> factors;                     ///< [y][x][blockLength]
-    std::vector<std::unique_ptr<FftArray<Real>>> blocks; ///< per thread: three columns and the noise of one row
+    FftArray<Real> grids[3]; ///< [x][y][rowLength], real or complex
+    FftArray<Real> factors;  ///< [y][x][blockLength]
+    /// per thread: three columns and the noise of one row
+    std::vector<std::unique_ptr<FftArray<Real>>> blocks;
     std::vector<int> order, columnOf, columnStart, first, sortedFirst;
     std::vector<Real> offsets, weights, sortedForces, sortedVelocities;
 };

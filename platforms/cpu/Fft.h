@@ -2,8 +2,9 @@
 #ifndef OPENMMPSE_FFT_H_
 #define OPENMMPSE_FFT_H_
 
-// The only place that speaks to an FFT library, through the interface of FFTW 3 (which MKL offers too). Plans are serial
-// and made by estimate, never by timing: the same plan on every run and for any number of threads, so the same bits.
+// The only place that speaks to an FFT library, through the interface of FFTW 3 (which MKL offers
+// too). Plans are serial and made by estimate, never by timing: the same plan on every run and for
+// any number of threads, so the same bits.
 
 #include <complex>
 #include <cstddef>
@@ -12,11 +13,9 @@
 
 namespace PSE {
 
-template <class Real>
-struct FftLibrary;
+template <class Real> struct FftLibrary;
 
-template <>
-struct FftLibrary<float> {
+template <> struct FftLibrary<float> {
     using Plan = fftwf_plan;
     using Complex = fftwf_complex;
     static constexpr auto planReal = fftwf_plan_many_dft_r2c;
@@ -30,8 +29,7 @@ struct FftLibrary<float> {
     static constexpr auto release = fftwf_free;
 };
 
-template <>
-struct FftLibrary<double> {
+template <> struct FftLibrary<double> {
     using Plan = fftw_plan;
     using Complex = fftw_complex;
     static constexpr auto planReal = fftw_plan_many_dft_r2c;
@@ -46,8 +44,7 @@ struct FftLibrary<double> {
 };
 
 /** Memory with the alignment that plans were made for; contents undefined. */
-template <class Real>
-class FftArray {
+template <class Real> class FftArray {
 public:
     explicit FftArray(size_t size = 0) { resize(size); }
     ~FftArray() { FftLibrary<Real>::release(data); }
@@ -64,12 +61,11 @@ private:
 };
 
 /**
- * The transforms of a real grid [x][y][z] in two stages that threads can share: planes (y, z) between real and complex, in
- * place, and columns along x, from the grid into a block [x][z] of the caller and back. Unnormalised; forward has
- * exp(-i k x).
+ * The transforms of a real grid [x][y][z] in two stages that threads can share: planes (y, z)
+ * between real and complex, in place, and columns along x, from the grid into a block [x][z] of the
+ * caller and back. Unnormalised; forward has exp(-i k x).
  */
-template <class Real>
-class GridFft {
+template <class Real> class GridFft {
 public:
     using Complex = std::complex<Real>;
     /**

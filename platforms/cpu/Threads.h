@@ -8,8 +8,9 @@
 namespace PSE {
 
 /**
- * Runs independent tasks on OpenMM's threads. Whatever a task computes must not depend on the thread it runs on, nor on
- * how many there are: then a step gives the same bits for any number of threads.
+ * Runs independent tasks on OpenMM's threads. Whatever a task computes must not depend on the
+ * thread it runs on, nor on how many there are: then a step gives the same bits for any number of
+ * threads.
  */
 class Threads {
 public:
@@ -18,8 +19,7 @@ public:
     int count() const { return serial ? 1 : pool.getNumThreads(); }
 
     /** Call work(task, thread) once for each task in [0, tasks); it must not throw. */
-    template <class Work>
-    void run(int tasks, Work work) const {
+    template <class Work> void run(int tasks, Work work) const {
         if (serial || tasks < 2) {
             for (int task = 0; task < tasks; task++)
                 work(task, 0);
@@ -34,11 +34,12 @@ public:
     }
 
     /** Call work(from, to, block) for blocks of a fixed size that cover [0, n). */
-    template <class Work>
-    void runBlocks(int n, Work work) const {
-        run(blocks(n), [&](int block, int) { work(block*BLOCK, n < (block + 1)*BLOCK ? n : (block + 1)*BLOCK, block); });
+    template <class Work> void runBlocks(int n, Work work) const {
+        run(blocks(n), [&](int block, int) {
+            work(block * BLOCK, n < (block + 1) * BLOCK ? n : (block + 1) * BLOCK, block);
+        });
     }
-    static int blocks(int n) { return (n + BLOCK - 1)/BLOCK; }
+    static int blocks(int n) { return (n + BLOCK - 1) / BLOCK; }
 
 private:
     static constexpr int BLOCK = 256;

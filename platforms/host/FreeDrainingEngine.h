@@ -9,7 +9,8 @@ namespace PSE {
 /** No hydrodynamic interaction: M = 1/(6 pi eta a_i), each particle with its own radius [T2]. */
 class FreeDrainingEngine : public MobilityEngine {
 public:
-    FreeDrainingEngine(double viscosity, const std::vector<double>& radii, const std::vector<int>& indices, StageClock& clock);
+    FreeDrainingEngine(double viscosity, const std::vector<double>& radii,
+                       const std::vector<int>& indices, StageClock& clock);
     void setPositions(const std::vector<numerics::Vec3>&) override {}
     void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
                            std::vector<numerics::Vec3>& u) override;

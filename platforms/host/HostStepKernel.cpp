@@ -27,26 +27,27 @@ Vec3 fromOpenMM(const OmmVec3& v) {
     return Vec3(v[0], v[1], v[2]);
 }
 
-template <class T>
-void write(std::ostream& stream, const T& value) {
+template <class T> void write(std::ostream& stream, const T& value) {
     stream.write(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-template <class T>
-T read(std::istream& stream) {
+template <class T> T read(std::istream& stream) {
     T value;
     stream.read(reinterpret_cast<char*>(&value), sizeof(T));
     if (!stream)
-        throw OpenMMException("PSEBrownianIntegrator: the checkpoint ends early; it is truncated or was not written with "
-                              "PSEBrownianIntegrator. Create a new one with Context.createCheckpoint");
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint ends early; it is truncated or was not written "
+            "with "
+            "PSEBrownianIntegrator. Create a new one with Context.createCheckpoint");
     return value;
 }
 
 string readText(std::istream& stream, size_t limit) {
     const uint64_t length = read<uint64_t>(stream);
     if (length > limit)
-        throw OpenMMException("PSEBrownianIntegrator: the checkpoint was not written with PSEBrownianIntegrator; "
-                              "load it with the integrator that wrote it");
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint was not written with PSEBrownianIntegrator; "
+            "load it with the integrator that wrote it");
     string text(length, ' ');
     for (char& c : text)
         c = read<char>(stream);
@@ -60,12 +61,13 @@ void writeText(std::ostream& stream, const string& text) {
 
 } // namespace
 
-HostStepKernel::HostStepKernel(string name, const OpenMM::Platform& platform, OpenMM::ReferencePlatform::PlatformData& data,
+HostStepKernel::HostStepKernel(string name, const OpenMM::Platform& platform,
+                               OpenMM::ReferencePlatform::PlatformData& data,
                                std::unique_ptr<EngineFactory> factory)
-    : IntegratePSEStepKernel(name, platform), data(data), factory(std::move(factory)) {
-}
+    : IntegratePSEStepKernel(name, platform), data(data), factory(std::move(factory)) {}
 
-void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator, const Scene& sceneSeen) {
+void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                                const Scene& sceneSeen) {
     scene = sceneSeen;
     masses.clear();
     for (int i = 0; i < context.getSystem().getNumParticles(); i++)
@@ -88,12 +90,12 @@ void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrato
     overrides.windowShape = wish.windowShape;
     overrides.lanczosTolerance = wish.lanczosTolerance;
     try {
-        request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()), scene.radii[0],
-                                      integrator.getErrorTolerance(), integrator.getTemperature() > 0, 0, false, overrides});
+        request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
+                                      scene.radii[0], integrator.getErrorTolerance(),
+                                      integrator.getTemperature() > 0, 0, false, overrides});
         factory->adapt(*request);
         plan(request->box);
-    }
-    catch (const std::invalid_argument& refusal) {
+    } catch (const std::invalid_argument& refusal) {
         throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
     }
 }
@@ -116,8 +118,7 @@ void HostStepKernel::followPositions() {
             const Lattice box = currentBox();
             if (box != request->box)
                 plan(box);
-        }
-        catch (const std::invalid_argument& refusal) {
+        } catch (const std::invalid_argument& refusal) {
             throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
         }
     }
@@ -134,16 +135,18 @@ vector<Vec3> HostStepKernel::gathered(const vector<OmmVec3>& all) const {
 vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double scale) const {
     vector<OmmVec3> all(masses.size());
     for (size_t i = 0; i < mobile.size(); i++)
-        all[scene.mobile[i]] = OmmVec3(mobile[i][0], mobile[i][1], mobile[i][2])*scale;
+        all[scene.mobile[i]] = OmmVec3(mobile[i][0], mobile[i][1], mobile[i][2]) * scale;
     return all;
 }
 
-void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what, const char* unit, const char* remedy) const {
+void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what, const char* unit,
+                                   const char* remedy) const {
     for (size_t i = 0; i < values.size(); i++)
         if (!values[i].allFinite()) {
             std::ostringstream message;
-            message << "PSEBrownianIntegrator: " << what << " of particle " << scene.mobile[i] << " is (" << values[i][0] << ", "
-                    << values[i][1] << ", " << values[i][2] << ") " << unit << ", which is not finite; " << remedy;
+            message << "PSEBrownianIntegrator: " << what << " of particle " << scene.mobile[i]
+                    << " is (" << values[i][0] << ", " << values[i][1] << ", " << values[i][2]
+                    << ") " << unit << ", which is not finite; " << remedy;
             throw OpenMMException(message.str());
         }
 }
@@ -156,21 +159,23 @@ Thermal HostStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sa
     const uint64_t counter = sample ? samples : steps;
     const NoiseKey real = {uint32_t(seed), sample ? Stream::SampleReal : Stream::StepReal, counter};
     const NoiseKey wave = {uint32_t(seed), sample ? Stream::SampleWave : Stream::StepWave, counter};
-    return {KT_PER_KELVIN*integrator.getTemperature(), integrator.getStepSize(), real, wave};
+    return {KT_PER_KELVIN * integrator.getTemperature(), integrator.getStepSize(), real, wave};
 }
 
 void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& integrator) {
     const vector<Vec3> forces = gathered(*data.forces);
-    requireFinite(forces, "the force", "kJ/(mol nm)", "check the Forces at these positions, or use a smaller step size");
+    requireFinite(forces, "the force", "kJ/(mol nm)",
+                  "check the Forces at these positions, or use a smaller step size");
     followPositions();
     const Thermal noise = thermal(integrator, false);
     engine->computeVelocities(&forces, noise.kT > 0 ? &noise : NULL, velocities);
-    requireFinite(velocities, "the velocity", "nm/ps", "its force is too large; use a smaller step size");
+    requireFinite(velocities, "the velocity", "nm/ps",
+                  "its force is too large; use a smaller step size");
 
     const double dt = integrator.getStepSize();
     for (size_t i = 0; i < velocities.size(); i++) {
         const OmmVec3 u(velocities[i][0], velocities[i][1], velocities[i][2]);
-        (*data.positions)[scene.mobile[i]] += u*dt;
+        (*data.positions)[scene.mobile[i]] += u * dt;
         (*data.velocities)[scene.mobile[i]] = u;
     }
     context.computeVirtualSites();
@@ -182,7 +187,7 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
 double HostStepKernel::computeKineticEnergy(ContextImpl&) {
     double energy = 0;
     for (size_t i = 0; i < masses.size(); i++)
-        energy += 0.5*masses[i]*(*data.velocities)[i].dot((*data.velocities)[i]);
+        energy += 0.5 * masses[i] * (*data.velocities)[i].dot((*data.velocities)[i]);
     return energy;
 }
 
@@ -197,9 +202,11 @@ vector<OmmVec3> HostStepKernel::applyMobility(ContextImpl&, const vector<OmmVec3
     return scattered(u, 1);
 }
 
-vector<OmmVec3> HostStepKernel::sampleBrownianDisplacements(ContextImpl&, const PSEBrownianIntegrator& integrator, int count) {
+vector<OmmVec3> HostStepKernel::sampleBrownianDisplacements(ContextImpl&,
+                                                            const PSEBrownianIntegrator& integrator,
+                                                            int count) {
     vector<OmmVec3> all;
-    all.reserve(masses.size()*count);
+    all.reserve(masses.size() * count);
     const StageClock ofSteps = clock;
     followPositions();
     vector<Vec3> u(scene.mobile.size(), Vec3::Zero());
@@ -251,16 +258,18 @@ string HostStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
     text.precision(17);
-    text << "particles " << scene.mobile.size() << " of " << masses.size() << ", split " << p.split << ", xi " << p.xi
-         << " /nm, real-space cutoff " << p.realCutoff << " nm, grid " << p.gridDimensions[0] << " x " << p.gridDimensions[1]
-         << " x " << p.gridDimensions[2] << ", window support " << p.windowSupport << ", window shape " << p.windowShape
+    text << "particles " << scene.mobile.size() << " of " << masses.size() << ", split " << p.split
+         << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
+         << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
+         << ", window support " << p.windowSupport << ", window shape " << p.windowShape
          << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision";
     return text.str();
 }
 
 void HostStepKernel::createCheckpoint(std::ostream& stream) const {
     writeText(stream, CHECKPOINT_MAGIC);
-    // The box may have changed since the last step: what counts is the Plan that the next step will use.
+    // The box may have changed since the last step: what counts is the Plan that the next step will
+    // use.
     const bool stale = request && currentBox() != request->box;
     writeText(stream, signature(stale ? planFor(currentBox()) : currentPlan));
     write(stream, seed);
@@ -271,8 +280,9 @@ void HostStepKernel::createCheckpoint(std::ostream& stream) const {
 void HostStepKernel::loadCheckpoint(std::istream& stream) {
     const string magic = readText(stream, 256);
     if (magic != CHECKPOINT_MAGIC)
-        throw OpenMMException("PSEBrownianIntegrator: the checkpoint is of another kind or version ('" + magic +
-                              "'); this version reads '" + CHECKPOINT_MAGIC + "'");
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint is of another kind or version ('" + magic +
+            "'); this version reads '" + CHECKPOINT_MAGIC + "'");
     const string theirs = readText(stream, 4096);
     const int theirSeed = read<int>(stream);
     const uint64_t theirSteps = read<uint64_t>(stream), theirSamples = read<uint64_t>(stream);
@@ -280,9 +290,12 @@ void HostStepKernel::loadCheckpoint(std::istream& stream) {
         plan(currentBox()); // the box came with the checkpoint, and with it the Plan to compare
     const string ours = signature(currentPlan);
     if (theirs != ours)
-        throw OpenMMException("PSEBrownianIntegrator: the checkpoint was written with other numerical parameters (" + theirs +
-                              ") than this Context has (" + ours + "); create the Context with the same settings, or give them "
-                              "by setNumericalParameters. Positions, box and time of this Context are now the checkpoint's");
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint was written with other numerical parameters (" +
+            theirs + ") than this Context has (" + ours +
+            "); create the Context with the same settings, or give them "
+            "by setNumericalParameters. Positions, box and time of this Context are now the "
+            "checkpoint's");
     seed = theirSeed;
     steps = theirSteps;
     samples = theirSamples;
@@ -295,7 +308,8 @@ void HostStepKernel::getCounters(unsigned long long& step, unsigned long long& s
 
 void HostStepKernel::setCounters(unsigned long long step, unsigned long long sample) {
     if (step >= LARGEST_COUNTER || sample >= LARGEST_COUNTER)
-        throw OpenMMException("PSEBrownianIntegrator: the State holds a noise counter of 2^48 or more; it is damaged");
+        throw OpenMMException("PSEBrownianIntegrator: the State holds a noise counter of 2^48 or "
+                              "more; it is damaged");
     steps = step;
     samples = sample;
 }

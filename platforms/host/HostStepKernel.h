@@ -2,8 +2,8 @@
 #ifndef OPENMMPSE_HOSTSTEPKERNEL_H_
 #define OPENMMPSE_HOSTSTEPKERNEL_H_
 
-// One step of Brownian dynamics for the platforms that keep positions and forces in host memory, in double: Reference
-// and CPU. They differ in their MobilityEngine only.
+// One step of Brownian dynamics for the platforms that keep positions and forces in host memory, in
+// double: Reference and CPU. They differ in their MobilityEngine only.
 
 #include "MobilityEngine.h"
 #include "openmmpse/PSEKernels.h"
@@ -13,15 +13,19 @@ namespace PSE {
 
 class HostStepKernel : public IntegratePSEStepKernel {
 public:
-    HostStepKernel(std::string name, const OpenMM::Platform& platform, OpenMM::ReferencePlatform::PlatformData& data,
+    HostStepKernel(std::string name, const OpenMM::Platform& platform,
+                   OpenMM::ReferencePlatform::PlatformData& data,
                    std::unique_ptr<EngineFactory> factory);
-    void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator, const Scene& scene) override;
+    void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                    const Scene& scene) override;
     void checkPositions(OpenMM::ContextImpl& context) override;
     void execute(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator) override;
     double computeKineticEnergy(OpenMM::ContextImpl& context) override;
-    std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context, const std::vector<OpenMM::Vec3>& forces) override;
+    std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context,
+                                            const std::vector<OpenMM::Vec3>& forces) override;
     std::vector<OpenMM::Vec3> sampleBrownianDisplacements(OpenMM::ContextImpl& context,
-                                                          const PSEBrownianIntegrator& integrator, int count) override;
+                                                          const PSEBrownianIntegrator& integrator,
+                                                          int count) override;
     NumericalParameters getNumericalParameters() const override;
     std::vector<StageTime> getStageTimes() const override { return clock.times(); }
     void createCheckpoint(std::ostream& stream) const override;
@@ -37,9 +41,11 @@ private:
     void followPositions();
     Thermal thermal(const PSEBrownianIntegrator& integrator, bool sample) const;
     /** @throws OpenMMException naming the first particle whose entry is not finite */
-    void requireFinite(const std::vector<numerics::Vec3>& values, const char* what, const char* unit, const char* remedy) const;
+    void requireFinite(const std::vector<numerics::Vec3>& values, const char* what,
+                       const char* unit, const char* remedy) const;
     std::vector<numerics::Vec3> gathered(const std::vector<OpenMM::Vec3>& all) const;
-    std::vector<OpenMM::Vec3> scattered(const std::vector<numerics::Vec3>& mobile, double scale) const;
+    std::vector<OpenMM::Vec3> scattered(const std::vector<numerics::Vec3>& mobile,
+                                        double scale) const;
     numerics::Plan planFor(const numerics::Lattice& box) const;
     NumericalParameters parametersOf(const numerics::Plan& plan) const;
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
@@ -50,7 +56,8 @@ private:
     Scene scene;
     std::vector<double> masses;
     double viscosity = 0;
-    std::unique_ptr<numerics::PlanRequest> request; ///< NULL without hydrodynamics or mobile particles
+    /// NULL without hydrodynamics or mobile particles
+    std::unique_ptr<numerics::PlanRequest> request;
     numerics::Plan currentPlan = {};
     std::unique_ptr<MobilityEngine> engine;
     StageClock clock;

@@ -13,8 +13,8 @@ namespace PSE {
 
 /** The thermal part of a step: u += sqrt(2 kT/dt) M^{1/2} z [T1]. */
 struct Thermal {
-    double kT, dt;                   ///< kJ/mol, ps
-    numerics::NoiseKey real, wave;   ///< the noise of the two halves
+    double kT, dt;                 ///< kJ/mol, ps
+    numerics::NoiseKey real, wave; ///< the noise of the two halves
 };
 
 /** Stage times, in the order in which the stages first ran. */
@@ -32,8 +32,8 @@ private:
 };
 
 /**
- * The mobility of the mobile particles on one platform. Vectors have one entry per mobile particle, in units of
- * OpenMM (nm, kJ/(mol nm), nm/ps).
+ * The mobility of the mobile particles on one platform. Vectors have one entry per mobile particle,
+ * in units of OpenMM (nm, kJ/(mol nm), nm/ps).
  */
 class MobilityEngine {
 public:
@@ -45,8 +45,8 @@ public:
      * @param forces   NULL: none
      * @param thermal  NULL: no noise
      */
-    virtual void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
-                                   std::vector<numerics::Vec3>& u) = 0;
+    virtual void computeVelocities(const std::vector<numerics::Vec3>* forces,
+                                   const Thermal* thermal, std::vector<numerics::Vec3>& u) = 0;
     /** Lanczos iterations of the last call with noise. */
     virtual int lanczosIterations() const = 0;
 };
@@ -58,11 +58,14 @@ public:
     /** Fill in what the platform knows of the request: its precision and its costs. */
     virtual void adapt(numerics::PlanRequest& request) const = 0;
     /**
-     * @param indices  particle index in the System of each mobile particle: noise belongs to the particle
+     * @param indices  particle index in the System of each mobile particle: noise belongs to the
+     * particle
      * @throws OpenMMException naming the memory needed and available, if the Plan does not fit
      */
-    virtual std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
-                                                   const std::vector<int>& indices, StageClock& clock) const = 0;
+    virtual std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan,
+                                                   const numerics::Lattice& box, double viscosity,
+                                                   const std::vector<int>& indices,
+                                                   StageClock& clock) const = 0;
 };
 
 } // namespace PSE

@@ -30,11 +30,11 @@ public:
     }
     void scaledCopy(double s, const Vector& v, Vector& out) const {
         for (size_t i = 0; i < v.size(); i++)
-            out[i] = s*v[i];
+            out[i] = s * v[i];
     }
     void addScaled(double s, const Vector& v, Vector& out) const {
         for (size_t i = 0; i < v.size(); i++)
-            out[i] += s*v[i];
+            out[i] += s * v[i];
     }
 
 private:
@@ -42,25 +42,29 @@ private:
     std::deque<Vector> vectors; // references to earlier vectors stay valid while it grows
 };
 
-ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double viscosity, const std::vector<int>& indices,
-                                 StageClock& clock)
-    : plan(plan), box(box), viscosity(viscosity), selfMobility(1/(6*M_PI*viscosity*plan.a)), indices(indices), clock(clock),
-      table(makeRealTable(*plan.split, plan.realCutoff/plan.a, plan.tableError)) {
+ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double viscosity,
+                                 const std::vector<int>& indices, StageClock& clock)
+    : plan(plan), box(box), viscosity(viscosity), selfMobility(1 / (6 * M_PI * viscosity * plan.a)),
+      indices(indices), clock(clock),
+      table(makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError)) {
     listModes();
 }
 
 void ReferenceEngine::listModes() {
     const Matrix3 waves = box.waveVectors();
-    const int limit[3] = {(plan.grid[0] - 1)/2, (plan.grid[1] - 1)/2, (plan.grid[2] - 1)/2}; // Nyquist planes are dropped
+    // Nyquist planes are dropped
+    const int limit[3] = {(plan.grid[0] - 1) / 2, (plan.grid[1] - 1) / 2, (plan.grid[2] - 1) / 2};
     for (int n1 = -limit[0]; n1 <= limit[0]; n1++)
         for (int n2 = -limit[1]; n2 <= limit[1]; n2++)
             for (int n3 = 0; n3 <= limit[2]; n3++) {
                 if (!isCanonicalMode(n1, n2, n3))
                     continue;
-                const Vec3 k = waves*Vec3(n1, n2, n3);
-                const double weight = plan.split->waveWeight(k.norm()*plan.a);
+                const Vec3 k = waves * Vec3(n1, n2, n3);
+                const double weight = plan.split->waveWeight(k.norm() * plan.a);
                 if (weight > 0)
-                    modes.push_back({{n1, n2, n3}, k.normalized(), weight/(viscosity*box.volume()*k.squaredNorm())});
+                    modes.push_back({{n1, n2, n3},
+                                     k.normalized(),
+                                     weight / (viscosity * box.volume() * k.squaredNorm())});
             }
 }
 
@@ -79,7 +83,7 @@ void ReferenceEngine::setPositions(const std::vector<Vec3>& x) {
 }
 
 void ReferenceEngine::addPair(int i, int j, const Vec3& d) {
-    const Vec3 reduced = d/plan.a;
+    const Vec3 reduced = d / plan.a;
     const double r = reduced.norm();
     if (r >= table.rc)
         return;
@@ -96,14 +100,18 @@ void ReferenceEngine::listNeighbours() {
         vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
     OpenMM::NeighborList list;
     const int n = static_cast<int>(positions.size());
-    const double margin = 1e-9*plan.realCutoff; // the list's own rounding must not lose a pair
-    computeNeighborListVoxelHash(list, n, locations, std::vector<std::set<int>>(n), vectors, true, plan.realCutoff + margin);
+    const double margin = 1e-9 * plan.realCutoff; // the list's own rounding must not lose a pair
+    computeNeighborListVoxelHash(list, n, locations, std::vector<std::set<int>>(n), vectors, true,
+                                 plan.realCutoff + margin);
     for (const auto& pair : list) {
-        const int i = static_cast<int>(std::min(pair.first, pair.second)), j = static_cast<int>(std::max(pair.first, pair.second));
+        const int i = static_cast<int>(std::min(pair.first, pair.second)),
+                  j = static_cast<int>(std::max(pair.first, pair.second));
         addPair(i, j, box.minimumImage(positions[i] - positions[j]));
     }
-    // The order of the list must not show in the last bits: a restart rebuilds it from the same positions.
-    std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.i < q.i || (p.i == q.i && p.j < q.j); });
+    // The order of the list must not show in the last bits: a restart rebuilds it from the same
+    // positions.
+    std::sort(pairs.begin(), pairs.end(),
+              [](const Pair& p, const Pair& q) { return p.i < q.i || (p.i == q.i && p.j < q.j); });
 }
 
 void ReferenceEngine::listImages() {
@@ -118,12 +126,12 @@ void ReferenceEngine::listImages() {
 
 void ReferenceEngine::preparePhases() {
     for (int d = 0; d < 3; d++) {
-        const int reach = plan.grid[d]/2;
-        phases[d].resize(positions.size()*(2*reach + 1));
+        const int reach = plan.grid[d] / 2;
+        phases[d].resize(positions.size() * (2 * reach + 1));
         for (size_t i = 0; i < positions.size(); i++) {
-            const double angle = 2*M_PI*box.fractional(positions[i])[d];
+            const double angle = 2 * M_PI * box.fractional(positions[i])[d];
             for (int n = -reach; n <= reach; n++)
-                phases[d][i*(2*reach + 1) + reach + n] = std::polar(1.0, n*angle);
+                phases[d][i * (2 * reach + 1) + reach + n] = std::polar(1.0, n * angle);
         }
     }
 }
@@ -131,20 +139,20 @@ void ReferenceEngine::preparePhases() {
 complex<double> ReferenceEngine::phase(int particle, const Mode& mode) const {
     complex<double> product = 1;
     for (int d = 0; d < 3; d++) {
-        const int reach = plan.grid[d]/2;
-        product *= phases[d][particle*(2*reach + 1) + reach + mode.n[d]];
+        const int reach = plan.grid[d] / 2;
+        product *= phases[d][particle * (2 * reach + 1) + reach + mode.n[d]];
     }
     return product;
 }
 
 void ReferenceEngine::multiplyReal(const Vectors& v, Vectors& out) const {
     for (size_t i = 0; i < v.size(); i++)
-        out[i] = table.self*v[i];
+        out[i] = table.self * v[i];
     for (const Pair& p : pairs) {
-        out[p.i] += p.F*v[p.j] + p.C*p.d.dot(v[p.j])*p.d;
+        out[p.i] += p.F * v[p.j] + p.C * p.d.dot(v[p.j]) * p.d;
         // An image of the particle itself is listed with its opposite: once is enough.
         if (p.i != p.j)
-            out[p.j] += p.F*v[p.i] + p.C*p.d.dot(v[p.i])*p.d;
+            out[p.j] += p.F * v[p.i] + p.C * p.d.dot(v[p.i]) * p.d;
     }
 }
 
@@ -153,7 +161,7 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
     if (forces != NULL) {
         multiplyReal(*forces, part);
         for (size_t i = 0; i < u.size(); i++)
-            u[i] += selfMobility*part[i];
+            u[i] += selfMobility * part[i];
     }
     if (thermal != NULL) {
         Vectors z(u.size());
@@ -161,10 +169,11 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
             particleNoise(thermal->real, indices[i], z[i].data());
         LanczosSpace space(*this);
         // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-        iterations = lanczosSquareRoot(space, z, part, LANCZOS_TOLERANCE, std::max(2*plan.predictedError, 1e-10), true);
-        const double scale = std::sqrt(2*thermal->kT*selfMobility/thermal->dt);
+        iterations = lanczosSquareRoot(space, z, part, LANCZOS_TOLERANCE,
+                                       std::max(2 * plan.predictedError, 1e-10), true);
+        const double scale = std::sqrt(2 * thermal->kT * selfMobility / thermal->dt);
         for (size_t i = 0; i < u.size(); i++)
-            u[i] += scale*part[i];
+            u[i] += scale * part[i];
     }
 }
 
@@ -176,16 +185,17 @@ void ReferenceEngine::addWaves(const Vectors* forces, const Thermal* thermal, Ve
         for (int i = 0; i < n; i++) {
             e[i] = phase(i, mode);
             if (forces != NULL)
-                wave += mode.B*std::conj(e[i])*(*forces)[i];
+                wave += mode.B * std::conj(e[i]) * (*forces)[i];
         }
         if (thermal != NULL) {
             complex<double> z[3];
             modeNoise(thermal->wave, mode.n[0], mode.n[1], mode.n[2], z);
-            wave += std::sqrt(2*thermal->kT*mode.B/thermal->dt)*Eigen::Vector3cd(z[0], z[1], z[2]);
+            wave += std::sqrt(2 * thermal->kT * mode.B / thermal->dt) *
+                    Eigen::Vector3cd(z[0], z[1], z[2]);
         }
-        wave -= mode.direction*(mode.direction.cast<complex<double>>().dot(wave));
+        wave -= mode.direction * (mode.direction.cast<complex<double>>().dot(wave));
         for (int i = 0; i < n; i++) // the mode and its conjugate
-            u[i] += 2*(e[i]*wave).real();
+            u[i] += 2 * (e[i] * wave).real();
     }
 }
 

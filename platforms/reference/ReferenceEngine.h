@@ -2,8 +2,9 @@
 #ifndef OPENMMPSE_REFERENCEENGINE_H_
 #define OPENMMPSE_REFERENCEENGINE_H_
 
-// The oracle: double precision, direct sums over pairs and over the wave vectors of the Plan; no window, no FFT, and
-// Lanczos converged to 1e-12. Its cost grows as N times the number of modes: use it up to about 1000 particles.
+// The oracle: double precision, direct sums over pairs and over the wave vectors of the Plan; no
+// window, no FFT, and Lanczos converged to 1e-12. Its cost grows as N times the number of modes:
+// use it up to about 1000 particles.
 
 #include "MobilityEngine.h"
 #include "numerics/RealTable.h"
@@ -15,8 +16,8 @@ class ReferenceEngine : public MobilityEngine {
 public:
     static constexpr double LANCZOS_TOLERANCE = 1e-12;
 
-    ReferenceEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity, const std::vector<int>& indices,
-                    StageClock& clock);
+    ReferenceEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+                    const std::vector<int>& indices, StageClock& clock);
     void setPositions(const std::vector<numerics::Vec3>& x) override;
     void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
                            std::vector<numerics::Vec3>& u) override;
@@ -26,8 +27,8 @@ private:
     using Vectors = std::vector<numerics::Vec3>;
     struct Pair {
         int i, j;
-        numerics::Vec3 d;   ///< x_i - x_j in radii
-        double F, C;        ///< M_R = F I + C d d^T
+        numerics::Vec3 d; ///< x_i - x_j in radii
+        double F, C;      ///< M_R = F I + C d d^T
     };
     struct Mode {
         int n[3];
@@ -53,9 +54,10 @@ private:
     std::vector<int> indices;
     StageClock& clock;
     numerics::RealTable table;
-    std::vector<Mode> modes;    ///< one of each pair n, -n
-    Vectors positions;          ///< in the primary box
-    std::vector<Pair> pairs;    ///< each unordered pair (and image) once; i == j for images of a particle itself
+    std::vector<Mode> modes; ///< one of each pair n, -n
+    Vectors positions;       ///< in the primary box
+    /// each unordered pair (and image) once; i == j for images of a particle itself
+    std::vector<Pair> pairs;
     /** phases[d][particle*(2 R + 1) + R + n] = exp(i 2 pi n s_d), R = M_d/2. */
     std::vector<std::complex<double>> phases[3];
     int iterations = 0;

@@ -20,18 +20,22 @@ public:
         request.directSums = true;
         request.overrides.lanczosTolerance = ReferenceEngine::LANCZOS_TOLERANCE;
     }
-    std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
-                                           const std::vector<int>& indices, StageClock& clock) const override {
-        requireMemory(plan, 0.5*48); // one mode for every two grid points
-        return std::unique_ptr<MobilityEngine>(new ReferenceEngine(plan, box, viscosity, indices, clock));
+    std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box,
+                                           double viscosity, const std::vector<int>& indices,
+                                           StageClock& clock) const override {
+        requireMemory(plan, 0.5 * 48); // one mode for every two grid points
+        return std::unique_ptr<MobilityEngine>(
+            new ReferenceEngine(plan, box, viscosity, indices, clock));
     }
 };
 
 class ReferenceKernelFactory : public KernelFactory {
 public:
-    KernelImpl* createKernelImpl(std::string name, const Platform& platform, ContextImpl& context) const override {
+    KernelImpl* createKernelImpl(std::string name, const Platform& platform,
+                                 ContextImpl& context) const override {
         auto& data = *static_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-        return new HostStepKernel(name, platform, data, std::unique_ptr<EngineFactory>(new ReferenceEngineFactory()));
+        return new HostStepKernel(name, platform, data,
+                                  std::unique_ptr<EngineFactory>(new ReferenceEngineFactory()));
     }
 };
 
@@ -39,12 +43,12 @@ public:
 
 } // namespace PSE
 
-extern "C" OPENMM_EXPORT void registerPlatforms() {
-}
+extern "C" OPENMM_EXPORT void registerPlatforms() {}
 
 extern "C" OPENMM_EXPORT void registerKernelFactories() {
     // By name: the CPU platform is a ReferencePlatform too, and has a plugin of its own.
     for (int i = 0; i < Platform::getNumPlatforms(); i++)
         if (Platform::getPlatform(i).getName() == "Reference")
-            Platform::getPlatform(i).registerKernelFactory(PSE::IntegratePSEStepKernel::Name(), new PSE::ReferenceKernelFactory());
+            Platform::getPlatform(i).registerKernelFactory(PSE::IntegratePSEStepKernel::Name(),
+                                                           new PSE::ReferenceKernelFactory());
 }

@@ -18,17 +18,21 @@ namespace PSE {
  * For a free-draining fluid xi = 0 and the grid is (0, 0, 0).
  */
 struct OPENMM_EXPORT_PSE NumericalParameters {
-    std::string split;             ///< name of the real/wave split: "Hasimoto", or "none" without one
-    double xi = 0;                 ///< splitting parameter (in 1/nm)
-    double realCutoff = 0;         ///< range of the real-space half (in nm)
+    /// name of the real/wave split: "Hasimoto", or "none" without one
+    std::string split;
+    double xi = 0;                     ///< splitting parameter (in 1/nm)
+    double realCutoff = 0;             ///< range of the real-space half (in nm)
     int gridDimensions[3] = {0, 0, 0}; ///< grid points along the three box vectors
-    int windowSupport = 0;         ///< grid points per axis that one particle touches, P
-    double windowShape = 0;        ///< shape beta of the Kaiser-Bessel window (dimensionless)
-    double lanczosTolerance = 0;   ///< relative error of the real-space noise, 2-norm
-    int lanczosIterations = 0;     ///< iterations of the last thermal step (reported, never set)
-    double predictedError = 0;     ///< the Plan's estimate of the error of M f, relative to |f|/(6 pi eta a) (reported, never set)
-    std::string precision;         ///< "single" or "double" arrays for the fluid (reported, never set)
-    int randomSeed = 0;            ///< seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
+    int windowSupport = 0;             ///< grid points per axis that one particle touches, P
+    double windowShape = 0;            ///< shape beta of the Kaiser-Bessel window (dimensionless)
+    double lanczosTolerance = 0;       ///< relative error of the real-space noise, 2-norm
+    int lanczosIterations = 0; ///< iterations of the last thermal step (reported, never set)
+    /// the Plan's estimate of the error of M f, relative to |f|/(6 pi eta a) (reported, never set)
+    double predictedError = 0;
+    /// "single" or "double" arrays for the fluid (reported, never set)
+    std::string precision;
+    /// seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
+    int randomSeed = 0;
 };
 
 /**
@@ -50,25 +54,25 @@ class OPENMM_EXPORT_PSE PSEBrownianIntegrator : public OpenMM::Integrator {
 public:
     /** The mobility M. */
     enum MobilityModel : int {
-        RotnePragerYamakawa = 0, ///< rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
-        ForceCoupling = 1,       ///< Gaussian envelopes, sigma = a/sqrt(pi)
-        FreeDraining = 2         ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
+        /// rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
+        RotnePragerYamakawa = 0,
+        ForceCoupling = 1, ///< Gaussian envelopes, sigma = a/sqrt(pi)
+        FreeDraining = 2   ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
     };
     /** What surrounds the particles. */
     enum FluidBoundary : int {
-        Automatic = 0, ///< periodic if any Force uses periodic boundary conditions, else unbounded
-        Periodic = 1,  ///< periodic in the box of the Context, zero mean flow
-        Unbounded = 2  ///< infinite solvent
+        /// periodic if any Force uses periodic boundary conditions, else unbounded
+        Automatic = 0,
+        Periodic = 1, ///< periodic in the box of the Context, zero mean flow
+        Unbounded = 2 ///< infinite solvent
     };
     /** How M is divided into a real-space and a wave-space half. */
-    enum Split : int {
-        AutomaticSplit = 0,
-        Prolate = 1,
-        Hasimoto = 2
-    };
+    enum Split : int { AutomaticSplit = 0, Prolate = 1, Hasimoto = 2 };
     /**
-     * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without noise
-     * @param viscosity    shear viscosity of the solvent (in Da/(nm ps)), > 0; 1 mPa s = 602.214 Da/(nm ps)
+     * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without
+     * noise
+     * @param viscosity    shear viscosity of the solvent (in Da/(nm ps)), > 0; 1 mPa s = 602.214
+     * Da/(nm ps)
      * @param radius       hydrodynamic radius of every particle without one of its own (in nm), > 0
      * @param stepSize     time step (in ps), > 0
      * @throws OpenMMException if an argument is not finite or outside its range
@@ -100,15 +104,18 @@ public:
      * @param radius  its radius (in nm), > 0
      */
     void setParticleRadius(int index, double radius);
-    /** Get the radii that differ from the default by a call of setParticleRadius(): index -> radius (in nm). */
+    /**
+     * Get the radii that differ from the default by a call of setParticleRadius(): index -> radius
+     * (in nm).
+     */
     const std::map<int, double>& getParticleRadii() const { return particleRadii; }
     /** Get the relative error allowed in M f and in the covariance of the noise. */
     double getErrorTolerance() const { return tolerance; }
     /**
      * Set the relative error allowed in the mobility: the computed u obeys
      * |u - M f| <= tolerance max(|M f|, |f/(6 pi eta a)|) (2-norms over all particles) for random,
-     * uniform and balanced forces, and within 3 tolerance for the worst f there is. The covariance of
-     * the noise is that of a mobility that close to M.
+     * uniform and balanced forces, and within 3 tolerance for the worst f there is. The covariance
+     * of the noise is that of a mobility that close to M.
      * @param tolerance  dimensionless, in [1e-10, 1e-1]; default 1e-3
      */
     void setErrorTolerance(double tolerance);
@@ -122,7 +129,10 @@ public:
     void setFluidBoundary(FluidBoundary boundary);
     /** Get the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). */
     double getShearRate() const { return shearRate; }
-    /** Set the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). Takes effect at the next step. */
+    /**
+     * Set the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). Takes effect at the next
+     * step.
+     */
     void setShearRate(double rate);
     /** Get the requested split. */
     Split getSplit() const { return split; }
@@ -130,7 +140,10 @@ public:
     void setSplit(Split split);
     /** Get the requested splitting parameter (in 1/nm); 0 = automatic. */
     double getSplittingParameter() const { return requested.xi; }
-    /** Set the splitting parameter xi (in 1/nm), > 0, or 0 for automatic. It moves cost between the halves, not the result. */
+    /**
+     * Set the splitting parameter xi (in 1/nm), > 0, or 0 for automatic. It moves cost between the
+     * halves, not the result.
+     */
     void setSplittingParameter(double xi);
     /** Get the requested grid dimensions; 0 = automatic. */
     void getGridDimensions(int& nx, int& ny, int& nz) const;
@@ -138,25 +151,31 @@ public:
     void setGridDimensions(int nx, int ny, int nz);
     /** Get the requested window support; 0 = automatic. */
     int getWindowSupport() const { return requested.windowSupport; }
-    /** Set the grid points per axis that one particle touches, in [3, 16], or 0 for automatic. */
+    /**
+     * Set the grid points per axis that one particle touches, in [3, 16], or 0 for automatic.
+     */
     void setWindowSupport(int support);
     /** Get what setNumericalParameters() and the three setters above asked for. */
     const NumericalParameters& getRequestedNumericalParameters() const { return requested; }
     /**
      * Reproduce the Plan of another Context: give what its getNumericalParameters() returned.
-     * Entries that are zero or empty stay automatic; reported entries (iterations, error, precision) are ignored,
-     * a non-zero randomSeed sets the seed.
+     * Entries that are zero or empty stay automatic; reported entries (iterations, error,
+     * precision) are ignored, a non-zero randomSeed sets the seed.
      */
     void setNumericalParameters(const NumericalParameters& parameters);
     /** Get the requested random number seed; 0 = drawn at Context creation. */
     int getRandomNumberSeed() const { return randomSeed; }
     /**
-     * Set the seed of the noise. The same seed, Plan and step give the same noise on every platform and any number
-     * of threads. 0 (the default) draws a new one for each Context; getNumericalParameters() tells it.
+     * Set the seed of the noise. The same seed, Plan and step give the same noise on every platform
+     * and any number of threads. 0 (the default) draws a new one for each Context;
+     * getNumericalParameters() tells it.
      */
     void setRandomNumberSeed(int seed);
 
-    /** Advance the simulation by a number of steps. @throws OpenMMException naming the first non-finite position or force */
+    /**
+     * Advance the simulation by a number of steps. @throws OpenMMException naming the first
+     * non-finite position or force
+     */
     void step(int steps) override;
     /**
      * Get the velocities M f that given forces cause at the current positions (without shear flow).
@@ -166,15 +185,19 @@ public:
      */
     std::vector<OpenMM::Vec3> applyMobility(const std::vector<OpenMM::Vec3>& forces);
     /**
-     * Draw independent samples of sqrt(2 kT dt M) dW at the current positions. They come from a stream of their own:
-     * repeated calls differ, the trajectory and its noise are unchanged. All are zero at temperature 0.
+     * Draw independent samples of sqrt(2 kT dt M) dW at the current positions. They come from a
+     * stream of their own: repeated calls differ, the trajectory and its noise are unchanged. All
+     * are zero at temperature 0.
      * @param count  number of samples, >= 0
      * @return count*N displacements, sample by sample (in nm)
      */
     std::vector<OpenMM::Vec3> sampleBrownianDisplacements(int count);
     /** Get the numerical parameters that the Context really uses, and the error they predict. */
     NumericalParameters getNumericalParameters() const;
-    /** Tell in words which effects are active and why, the parameters in use, and what share of a step each costs. */
+    /**
+     * Tell in words which effects are active and why, the parameters in use, and what share of a
+     * step each costs.
+     */
     std::string describe() const;
 
 protected:

@@ -15,25 +15,38 @@ namespace PSE {
 class IntegratePSEStepKernel : public OpenMM::KernelImpl {
 public:
     static std::string Name() { return "IntegratePSEStep"; }
-    IntegratePSEStepKernel(std::string name, const OpenMM::Platform& platform) : OpenMM::KernelImpl(name, platform) {}
+    IntegratePSEStepKernel(std::string name, const OpenMM::Platform& platform)
+        : OpenMM::KernelImpl(name, platform) {}
 
-    /** Make the Plan and everything that depends on it. Throws if the scene cannot be simulated as asked. */
-    virtual void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator, const Scene& scene) = 0;
+    /**
+     * Make the Plan and everything that depends on it. Throws if the scene cannot be simulated as
+     * asked.
+     */
+    virtual void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                            const Scene& scene) = 0;
     /** Throw, naming the first non-finite position, before any Force sees it. */
     virtual void checkPositions(OpenMM::ContextImpl& context) = 0;
-    /** Advance the positions by one step; forces have been computed. Nothing is changed if it throws. */
+    /**
+     * Advance the positions by one step; forces have been computed. Nothing is changed if it
+     * throws.
+     */
     virtual void execute(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator) = 0;
     virtual double computeKineticEnergy(OpenMM::ContextImpl& context) = 0;
     /** forces (kJ/(mol nm)) -> velocities (nm/ps) */
-    virtual std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context, const std::vector<OpenMM::Vec3>& forces) = 0;
-    virtual std::vector<OpenMM::Vec3> sampleBrownianDisplacements(OpenMM::ContextImpl& context,
-                                                                  const PSEBrownianIntegrator& integrator, int count) = 0;
+    virtual std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context,
+                                                    const std::vector<OpenMM::Vec3>& forces) = 0;
+    virtual std::vector<OpenMM::Vec3>
+    sampleBrownianDisplacements(OpenMM::ContextImpl& context,
+                                const PSEBrownianIntegrator& integrator, int count) = 0;
     virtual NumericalParameters getNumericalParameters() const = 0;
     /** What each stage of the steps so far has cost; empty before the first step. */
     virtual std::vector<StageTime> getStageTimes() const = 0;
     virtual void createCheckpoint(std::ostream& stream) const = 0;
     virtual void loadCheckpoint(std::istream& stream) = 0;
-    /** Thermal steps taken and samples drawn so far: with the seed, all the state there is besides the positions. */
+    /**
+     * Thermal steps taken and samples drawn so far: with the seed, all the state there is besides
+     * the positions.
+     */
     virtual void getCounters(unsigned long long& step, unsigned long long& sample) const = 0;
     virtual void setCounters(unsigned long long step, unsigned long long sample) = 0;
 };

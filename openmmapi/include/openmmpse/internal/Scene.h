@@ -9,12 +9,15 @@
 
 namespace PSE {
 
-/** Which effects a System and an integrator's settings call for, decided once for every platform. */
+/**
+ * Which effects a System and an integrator's settings call for, decided once for every platform.
+ */
 struct OPENMM_EXPORT_PSE Scene {
-    std::vector<int> mobile;     ///< indices of the particles that move and feel the fluid (mass > 0)
-    std::vector<double> radii;   ///< their hydrodynamic radii (nm)
-    int numMassless = 0;         ///< particles that do not move and are transparent to the fluid
-    bool hydrodynamics = false;  ///< particles feel each other through the fluid
+    /// indices of the particles that move and feel the fluid (mass > 0)
+    std::vector<int> mobile;
+    std::vector<double> radii;  ///< their hydrodynamic radii (nm)
+    int numMassless = 0;        ///< particles that do not move and are transparent to the fluid
+    bool hydrodynamics = false; ///< particles feel each other through the fluid
     std::string modelReason, boundaryReason;
 };
 
@@ -28,10 +31,12 @@ struct OPENMM_EXPORT_PSE StageTime {
  * Decide which effects are active.
  * @throws OpenMMException naming what is asked for but cannot be simulated, and what to do
  */
-OPENMM_EXPORT_PSE Scene makeScene(const OpenMM::System& system, const PSEBrownianIntegrator& integrator);
+OPENMM_EXPORT_PSE Scene makeScene(const OpenMM::System& system,
+                                  const PSEBrownianIntegrator& integrator);
 
 /** The text of PSEBrownianIntegrator::describe(). */
-std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator, const NumericalParameters& parameters,
+std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator,
+                          const NumericalParameters& parameters,
                           const std::vector<StageTime>& stages);
 
 } // namespace PSE
