@@ -49,14 +49,14 @@ def _molecules(axes, protein, polymer):
     both = np.vstack([left, right])
     low, high = both[:, :2].min(axis=0) - 1.0, both[:, :2].max(axis=0) + 1.0
     floor = low[1] - 1.0
-    axes.set(xlim=(low[0], high[0]), ylim=(floor - 1.5, high[1]),
+    axes.set(xlim=(low[0], high[0]), ylim=(floor - 4.0, high[1]),
              title="What moves: spheres of the hydrodynamic radius, to scale")
-    axes.set_aspect("equal", adjustable="box", anchor="NW")
+    axes.set_aspect("equal", adjustable="box", anchor="C")
     axes.text(left[:, 0].mean(), floor, f"T4 lysozyme\n{len(left)} residues", ha="center", va="top")
     axes.text(right[:, 0].mean(), floor, f"ideal polymer\n{len(right)} beads", ha="center", va="top")
-    start = low[0]
-    axes.plot([start, start + 2.0], [high[1] - 0.5] * 2, color=THEORY, lw=3, solid_capstyle="butt")
-    axes.text(start + 1.0, high[1] - 0.8, "2 nm", ha="center", va="top")
+    bar = floor - 3.0
+    axes.plot([low[0], low[0] + 2.0], [bar, bar], color=THEORY, lw=3, solid_capstyle="butt")
+    axes.text(low[0] + 2.3, bar, "2 nm", ha="left", va="center")
     axes.axis("off")
 
 
