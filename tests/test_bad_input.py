@@ -321,6 +321,21 @@ def testGridBeyondMemory():
     assertMentions(message, "16384 x 16384 x 16384", "GB", "memory")
 
 
+def testImagesBeyondMemory(platformName):
+    """Many particles in a box much smaller than a radius: the neighbours are too many, images included."""
+    rng = np.random.default_rng(3)
+    crowd = scenes.Scene(rng.random((1000, 3))*0.06, scenes.cube(0.06), 0.5)
+    message = messageOf(openmm.Context, makeSystem(crowd), makeIntegrator(), platformNamed(platformName))
+    assertMentions(message, "neighbours", "GB", "larger box")
+
+
+@pytest.mark.parametrize("edge", [0.049, 1e-3, 1e-9])
+def testBoxBelowATenthOfTheRadius(platformName, edge):
+    tiny = scenes.Scene(np.zeros((1, 3)), scenes.cube(edge), 0.5)
+    message = messageOf(openmm.Context, makeSystem(tiny), makeIntegrator(), platformNamed(platformName))
+    assertMentions(message, f"{edge:g} nm", "radius", "larger box")
+
+
 def testBoxThatGrowsBeyondMemory():
     """Set between steps: the step is refused, nothing has moved, and the old box still works."""
     s = suspension()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "Memory.h"
 #include "openmm/OpenMMException.h"
+#include <cmath>
 #include <sstream>
 #include <unistd.h>
 
@@ -8,20 +9,29 @@ namespace PSE {
 
 namespace {
 constexpr double GIGABYTE = 1e9;
-constexpr double USABLE = 0.8; ///< share of the machine's memory that the grid may take
+constexpr double USABLE = 0.8; ///< share of the machine's memory that may be taken
 } // namespace
 
-void requireMemory(const numerics::Plan& plan, double bytesPerGridPoint) {
+void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, size_t particles,
+                   const MemoryUse& use) {
     const double available = USABLE * sysconf(_SC_PHYS_PAGES) * double(sysconf(_SC_PAGESIZE));
-    const double needed = bytesPerGridPoint * plan.gridPoints();
-    if (needed <= available)
+    const double grid = use.perGridPoint * plan.gridPoints();
+    const double range = plan.realCutoff;
+    const double neighbours =
+        particles / box.volume() * 4.0 / 3 * M_PI * range * range * range; // images included
+    const double pairs = use.perOrderedPair * particles * neighbours;
+    if (grid + pairs <= available)
         return;
     std::ostringstream message;
-    message << "PSEBrownianIntegrator: the grid of " << plan.grid[0] << " x " << plan.grid[1]
-            << " x " << plan.grid[2] << " points needs " << needed / GIGABYTE << " GB of memory, "
-            << available / GIGABYTE << " GB can be used (80 % of the "
-            << "machine's); loosen the tolerance, choose a smaller splitting parameter or a "
-               "smaller box";
+    message << "PSEBrownianIntegrator: this scene needs " << grid / GIGABYTE
+            << " GB of memory for a grid of " << plan.grid[0] << " x " << plan.grid[1] << " x "
+            << plan.grid[2] << " points and " << pairs / GIGABYTE << " GB for the " << neighbours
+            << " neighbours (images included) of each particle within " << range << " nm; "
+            << available / GIGABYTE << " GB can be used (80 % of the machine's); ";
+    if (grid > pairs)
+        message << "loosen the tolerance, choose a smaller splitting parameter or a smaller box";
+    else
+        message << "use a larger box or fewer particles";
     throw OpenMM::OpenMMException(message.str());
 }
 

@@ -3,15 +3,22 @@
 #define OPENMMPSE_MEMORY_H_
 
 #include "numerics/Plan.h"
+#include <cstddef>
 
 namespace PSE {
 
+/** What a platform allocates, in bytes. */
+struct MemoryUse {
+    double perGridPoint;
+    double perOrderedPair; ///< per neighbour of a particle within the real-space range
+};
+
 /**
  * Refuse a Plan before anything is allocated for it.
- * @param bytesPerGridPoint  what the platform will allocate
  * @throws OpenMMException naming the memory needed, the memory of the machine and what to change
  */
-void requireMemory(const numerics::Plan& plan, double bytesPerGridPoint);
+void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, size_t particles,
+                   const MemoryUse& use);
 
 } // namespace PSE
 

@@ -23,7 +23,8 @@ public:
     std::unique_ptr<MobilityEngine> create(const numerics::Plan& plan, const numerics::Lattice& box,
                                            double viscosity, const std::vector<int>& indices,
                                            StageClock& clock) const override {
-        requireMemory(plan, 0.5 * 48); // one mode for every two grid points
+        // One mode of 48 bytes for every two grid points, one pair of 56 for two ordered ones.
+        requireMemory(plan, box, indices.size(), {24, 28});
         return std::unique_ptr<MobilityEngine>(
             new ReferenceEngine(plan, box, viscosity, indices, clock));
     }
