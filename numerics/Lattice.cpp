@@ -45,6 +45,13 @@ Vec3 Lattice::minimumImage(Vec3 d) const {
     return d;
 }
 
+double Lattice::imageCandidates(double range) const {
+    double count = 1;
+    for (int d = 0; d < 3; d++)
+        count *= 2 * std::floor(range * inverse.row(d).norm() + 1) + 1;
+    return count;
+}
+
 std::vector<Vec3> Lattice::imagesWithin(double range) const {
     // |d + R| <= range needs |R| <= range + |d|, and n_d = (R . reciprocal vector d) is bounded by
     // that length.

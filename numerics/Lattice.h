@@ -44,6 +44,8 @@ public:
      * the primary box.
      */
     std::vector<Vec3> imagesWithin(double range) const;
+    /** How many lattice vectors imagesWithin() looks at; may exceed any integer. */
+    double imageCandidates(double range) const;
     bool operator==(const Lattice& other) const { return boxVectors == other.boxVectors; }
     bool operator!=(const Lattice& other) const { return !(*this == other); }
 

@@ -40,6 +40,12 @@ constexpr double LONG_BOX = 2; ///< longest over shortest box vector
 constexpr double SMALLEST_BOX = 0.1;
 /// refinements of grid and window beyond the rules [T15]
 constexpr int LAST_ATTEMPT = 12;
+constexpr int LARGEST_SUPPORT = 16;   ///< what platforms have room for
+constexpr double MOST_IMAGES = 1e6;   ///< of one pair, when the range exceeds half the box
+constexpr double DENSEST = 100;       ///< volume fraction; beyond, the sums cancel too much
+constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
+/// predicted error below which single precision would be the larger error, as a share of its floor
+constexpr double SINGLE_SHARE = 0.1;
 constexpr double TABLE_SHARE = 0.05; ///< share of a half's budget for tables
 
 double volumeFraction(const PlanRequest& r) {
@@ -122,6 +128,9 @@ public:
             (request.tolerance >= request.singleFloor && plan.xi * plan.realCutoff <= SINGLE_RANGE);
         plan.precision = (single ? Precision::Single : Precision::Double);
         chooseWindow(plan, cost);
+        const double real = plan.split->realTruncation(plan.realCutoff / plan.a, phi, meanPhi);
+        if (real > 1.01 * error) // its range was cut
+            cost *= UNAFFORDABLE;
         return plan;
     }
 
@@ -135,7 +144,7 @@ public:
                    freeWindow = (wish.windowSupport == 0 && wish.windowShape == 0);
         double wave = waveErrorOf(plan);
         for (int attempt = 1; freeGrid && wave > error && attempt <= LAST_ATTEMPT; attempt++) {
-            if (freeWindow && attempt % 3 == 0) {
+            if (freeWindow && attempt % 3 == 0 && plan.windowSupport < LARGEST_SUPPORT) {
                 plan.windowSupport++;
                 plan.windowShape = shapeFor(error, plan.windowSupport);
             }
@@ -145,6 +154,15 @@ public:
         }
         const double real = plan.split->realTruncation(plan.realCutoff / plan.a, phi, meanPhi);
         plan.predictedError = std::hypot(wave, real);
+        if (plan.predictedError < SINGLE_SHARE * request.singleFloor)
+            plan.precision = Precision::Double;
+        if (wish.realCutoff == 0 && wish.xi == 0 && !(real <= request.tolerance)) {
+            std::ostringstream message;
+            message << "the smallest error that the real half reaches here is " << real
+                    << ", the tolerance is " << request.tolerance
+                    << "; loosen the tolerance or use a larger box";
+            throw std::invalid_argument(message.str());
+        }
         if (wish.realCutoff == 0 && !(real <= request.tolerance)) {
             std::ostringstream message;
             message << "splitting parameter " << plan.xi << " /nm leaves an error of " << real
@@ -233,12 +251,29 @@ void checkRequest(const PlanRequest& r) {
         if (r.box.length(d) < SMALLEST_BOX * r.radius)
             message << "box vector " << d << " has length " << r.box.length(d) << " nm, less than "
                     << SMALLEST_BOX << " of the radius " << r.radius << " nm; use a larger box";
+    const double phi = volumeFraction(r);
+    if (message.str().empty() && !(phi <= DENSEST))
+        message << "the volume fraction is " << phi << " (" << r.numParticles
+                << " particles of radius " << r.radius << " nm in " << r.box.volume()
+                << " nm^3), the limit is " << DENSEST << "; use a larger box or fewer particles";
     if (!message.str().empty())
         throw std::invalid_argument(message.str());
 }
 
-void checkPlan(const Plan& plan) {
+void checkPlan(const Plan& plan, const PlanRequest& request) {
     std::ostringstream message;
+    if (!plan.split) {
+        message << "no numerical parameters fit a radius of " << request.radius
+                << " nm in this box; check the units of radius and box";
+        throw std::invalid_argument(message.str());
+    }
+    if (plan.sumImages && request.box.imageCandidates(plan.realCutoff) > MOST_IMAGES) {
+        message << "a splitting parameter of " << plan.xi << " /nm has a real-space range of "
+                << plan.realCutoff << " nm, over " << MOST_IMAGES
+                << " images of this box; choose a larger splitting parameter, or 0 for the "
+                   "automatic one";
+        throw std::invalid_argument(message.str());
+    }
     for (int d = 0; d < 3; d++) {
         if (plan.grid[d] > WIDEST_GRID)
             message
@@ -317,7 +352,7 @@ Plan makePlan(const PlanRequest& request) {
     checkRequest(request);
     const Planner planner(request);
     double cost = 0;
-    Plan best;
+    Plan best = {};
     if (request.overrides.xi > 0)
         best = planner.at(request.overrides.xi * request.radius, cost);
     else {
@@ -333,7 +368,7 @@ Plan makePlan(const PlanRequest& request) {
         for (double xi = first; xi < last; xi *= factor) {
             Plan plan = planner.at(xi, cost);
             if (gridGiven) {
-                checkPlan(plan);
+                checkPlan(plan, request);
                 planner.finish(plan);
                 if (plan.predictedError > request.tolerance)
                     cost = plan.predictedError * 1e100;
@@ -344,9 +379,9 @@ Plan makePlan(const PlanRequest& request) {
             }
         }
     }
-    checkPlan(best);
+    checkPlan(best, request);
     planner.finish(best);
-    checkPlan(best);
+    checkPlan(best, request);
     return best;
 }
 

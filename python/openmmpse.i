@@ -139,10 +139,10 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
     val = tuple(val)
 %}
 %feature("pythonappend") PSE::PSEBrownianIntegrator::applyMobility %{
-    val = numpy.frombuffer(bytearray(val)).reshape(-1, 3)  # a bytearray: writable
+    val = numpy.frombuffer(val).reshape(-1, 3)
 %}
 %feature("pythonappend") PSE::PSEBrownianIntegrator::sampleBrownianDisplacements %{
-    val = numpy.frombuffer(bytearray(val)).reshape(count, self._particleCount(), 3)
+    val = numpy.frombuffer(val).reshape(count, self._particleCount(), 3)
 %}
 
 %include "docstrings.i"

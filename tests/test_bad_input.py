@@ -321,12 +321,42 @@ def testGridBeyondMemory():
     assertMentions(message, "16384 x 16384 x 16384", "GB", "memory")
 
 
-def testImagesBeyondMemory(platformName):
-    """Many particles in a box much smaller than a radius: the neighbours are too many, images included."""
-    rng = np.random.default_rng(3)
-    crowd = scenes.Scene(rng.random((1000, 3))*0.06, scenes.cube(0.06), 0.5)
-    message = messageOf(openmm.Context, makeSystem(crowd), makeIntegrator(), platformNamed(platformName))
-    assertMentions(message, "neighbours", "GB", "larger box")
+def testVolumeFractionBeyondSense(platformName):
+    """Many particles in a box much smaller than a radius."""
+    crowd = scenes.Scene(np.zeros((1000, 3)), scenes.cube(0.06), 0.5)
+    message = messageOf(openmm.Context, makeSystem(crowd), makeIntegrator(),
+                        platformNamed(platformName))
+    assertMentions(message, "volume fraction", "limit is 100", "larger box")
+
+
+def testNeighboursBeyondMemory(platformName):
+    """A range over many neighbours, images included: more pairs than memory holds."""
+    crowd = scenes.Scene(np.zeros((20000, 3)), scenes.cube(33.0), 0.5)
+    integrator = makeIntegrator()
+    integrator.setSplittingParameter(0.04)
+    message = messageOf(openmm.Context, makeSystem(crowd), integrator, platformNamed(platformName))
+    assertMentions(message, "neighbours", "GB")
+
+
+def testImagesBeyondCounting(platformName):
+    """A range over a million images of the box."""
+    few = scenes.Scene(np.zeros((3, 3)), scenes.cube(10.0), 0.5)
+    integrator = makeIntegrator()
+    integrator.setSplittingParameter(2e-6)
+    message = messageOf(openmm.Context, makeSystem(few), integrator, platformNamed(platformName))
+    assertMentions(message, "2e-06", "images", "larger splitting parameter")
+
+
+def testPositionLostToRounding(platformName):
+    s = suspension()
+    context, integrator = makeContext(s, platformName, 300.0)
+    far = s.positions.copy()
+    far[2, 1] = 1e200
+    context.setPositions(far)
+    for call, argument in ((integrator.step, 1), (integrator.applyMobility, np.ones((6, 3)))):
+        assertMentions(messageOf(call, argument), "particle 2", "1e+200", "rounding")
+    context.setPositions(s.positions)
+    integrator.step(1)
 
 
 @pytest.mark.parametrize("edge", [0.049, 1e-3, 1e-9])

@@ -403,3 +403,24 @@ def testThreadsDoNotChangeABit():
                                           configure=lambda i: i.setSplittingParameter(1.2))
         results.append(integrator.applyMobility(forces))
     assert np.array_equal(*results)
+
+
+@pytest.mark.parametrize("tilt", [0.2, -0.499])
+def testNeighbourListInTiltedBoxes(tilt):
+    """Boxes wide enough for the neighbour list: it must find the pairs across every face of a tilted box."""
+    a, L = 0.5, 22.0
+    box = np.array([[L, 0, 0], [tilt*L, L, 0], [tilt*L, tilt*L, L]])
+    s = Scene(np.random.default_rng(61).random((400, 3)) @ box, box, a)
+    forces = randomForces(s)
+    context, integrator = makeContext(s, "CPU", tolerance=1e-3,
+                                      configure=lambda i: i.setSplittingParameter(0.6/a))
+    parameters = integrator.getNumericalParameters()
+    assert parameters["realCutoff"] < 0.499*L  # else the explicit sum over images would be tested
+    oracle, exact = makeContext(s, "Reference",
+                                configure=lambda i: i.setNumericalParameters(parameters))
+    ratio = errorRatio(integrator.applyMobility(forces), exact.applyMobility(forces), forces, s)
+    assert ratio <= 1e-3
+    unmoved = integrator.applyMobility(forces)
+    for shift in np.random.default_rng(62).random((3, 3)):
+        context.setPositions(s.positions + shift @ box)
+        assert errorRatio(integrator.applyMobility(forces), unmoved, forces, s) <= 2e-3

@@ -39,6 +39,14 @@ void requireInRange(const char* name, double value, double low, double high) {
     refuse(message.str());
 }
 
+/** A counter of the noise from the text of a State. */
+unsigned long long counter(const string& text) {
+    if (text.empty() || text.size() > 15 || text.find_first_not_of("0123456789") != string::npos)
+        refuse("the State holds the noise counter '" + text +
+               "', which is not a number below 2^48; it is damaged");
+    return std::stoull(text);
+}
+
 } // namespace
 
 PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosity, double radius,
@@ -215,11 +223,12 @@ void PSEBrownianIntegrator::setRandomNumberSeed(int seed) {
 void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
     if (owner != NULL && &contextRef.getOwner() != owner)
         throw OpenMMException("This Integrator is already bound to a context");
-    const Scene seen = makeScene(contextRef.getSystem(), *this);
+    const auto seen = std::make_shared<const Scene>(makeScene(contextRef.getSystem(), *this));
     Kernel created =
         contextRef.getPlatform().createKernel(IntegratePSEStepKernel::Name(), contextRef);
-    created.getAs<IntegratePSEStepKernel>().initialize(contextRef, *this, seen);
+    created.getAs<IntegratePSEStepKernel>().initialize(contextRef, *this, *seen);
     kernel = created;
+    scene = seen;
     positionsSet = false;
     context = &contextRef;
     owner = &contextRef.getOwner();
@@ -289,8 +298,7 @@ NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
 string PSEBrownianIntegrator::describe() const {
     requireBound("describe");
     const IntegratePSEStepKernel& step = kernel.getAs<const IntegratePSEStepKernel>();
-    return describeScene(makeScene(context->getSystem(), *this), *this,
-                         step.getNumericalParameters(), step.getStageTimes());
+    return describeScene(*scene, *this, step.getNumericalParameters(), step.getStageTimes());
 }
 
 void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
@@ -321,8 +329,8 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
                std::to_string(node.getIntProperty("version")) +
                "; this version of openmmpse reads version 1");
     kernel.getAs<IntegratePSEStepKernel>().setCounters(
-        std::stoull(node.getStringProperty("noiseStep")),
-        std::stoull(node.getStringProperty("noiseSample")));
+        counter(node.getStringProperty("noiseStep")),
+        counter(node.getStringProperty("noiseSample")));
 }
 
 } // namespace PSE

@@ -68,14 +68,21 @@ template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Ve
 
 template <class Real> void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
     const int n = static_cast<int>(x.size());
-    atBuild = x;
+    atBuild.clear(); // no list while it is being built: an exception must not leave half of one
     if (listPositions.size() != 4 * n) {
         listPositions.resize(4 * n);
         noExclusions.resize(n);
     }
-    for (int i = 0; i < n; i++)
-        for (int d = 0; d < 4; d++)
-            listPositions[4 * i + d] = (d < 3 ? float(positions[i][d]) : 0);
+    // OpenMM's list wants x in [0, ax), y in [0, by), z in [0, cz): a brick, not the primary box.
+    const Matrix3& v = box.vectors();
+    for (int i = 0; i < n; i++) {
+        Vec3 p = positions[i];
+        for (int d = 2; d >= 0; d--)
+            p -= v.col(d) * std::floor(p[d] / v(d, d));
+        for (int d = 0; d < 3; d++)
+            listPositions[4 * i + d] = float(p[d]);
+        listPositions[4 * i + 3] = 0;
+    }
     OpenMM::Vec3 vectors[3];
     for (int d = 0; d < 3; d++)
         vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
@@ -109,6 +116,7 @@ template <class Real> void CpuRealSpace<Real>::buildList(const std::vector<Vec3>
             std::sort(candidates.begin() + candidateStart[i],
                       candidates.begin() + candidateStart[i + 1]);
     });
+    atBuild = x;
 }
 
 template <class Real> PairPolynomials<Real> CpuRealSpace<Real>::polynomials() const {

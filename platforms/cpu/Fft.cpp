@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "Fft.h"
 #include <new>
+#include <stdexcept>
+#include <string>
 
 namespace PSE {
 
@@ -49,6 +51,11 @@ GridFft<Real>::GridFft(int nx, int ny, int nz, size_t rowLength, size_t blockLen
     backwardColumn = Library::planComplex(1, &nx, waves, raw<Real>(block.begin()), NULL,
                                           int(blockLength), 1, raw<Real>(grid.begin()), NULL,
                                           stride, 1, FFTW_BACKWARD, FFTW_ESTIMATE);
+    for (auto plan : {forwardPlane, backwardPlane, forwardColumn, backwardColumn})
+        if (plan == NULL)
+            throw std::runtime_error("the FFT library has no plan for a grid of " +
+                                     std::to_string(nx) + " x " + std::to_string(ny) + " x " +
+                                     std::to_string(nz) + " points; set other grid dimensions");
 }
 
 template <class Real> GridFft<Real>::~GridFft() {

@@ -4,6 +4,8 @@
 
 #include "openmm/internal/ThreadPool.h"
 #include <atomic>
+#include <exception>
+#include <mutex>
 
 namespace PSE {
 
@@ -18,7 +20,8 @@ public:
     Threads(OpenMM::ThreadPool& pool, bool serial) : pool(pool), serial(serial) {}
     int count() const { return serial ? 1 : pool.getNumThreads(); }
 
-    /** Call work(task, thread) once for each task in [0, tasks); it must not throw. */
+    /** Call work(task, thread) once for each task in [0, tasks); the first exception is passed on.
+     */
     template <class Work> void run(int tasks, Work work) const {
         if (serial || tasks < 2) {
             for (int task = 0; task < tasks; task++)
@@ -26,11 +29,19 @@ public:
             return;
         }
         std::atomic<int> next(0);
+        std::exception_ptr error;
+        std::once_flag first;
         pool.execute([&](OpenMM::ThreadPool&, int thread) {
-            for (int task = next++; task < tasks; task = next++)
-                work(task, thread);
+            try {
+                for (int task = next++; task < tasks; task = next++)
+                    work(task, thread);
+            } catch (...) {
+                std::call_once(first, [&] { error = std::current_exception(); });
+            }
         });
         pool.waitForThreads();
+        if (error)
+            std::rethrow_exception(error);
     }
 
     /** Call work(from, to, block) for blocks of a fixed size that cover [0, n). */

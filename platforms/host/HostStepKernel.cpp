@@ -5,6 +5,7 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <sstream>
@@ -21,6 +22,8 @@ namespace PSE {
 namespace {
 
 constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 1";
+/// Boxes from the origin: there a position is known to 1e-7 of the box.
+constexpr double FARTHEST = 1e9;
 constexpr uint64_t LARGEST_COUNTER = uint64_t(1) << 48;
 
 Vec3 fromOpenMM(const OmmVec3& v) {
@@ -89,20 +92,20 @@ void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrato
     overrides.windowSupport = wish.windowSupport;
     overrides.windowShape = wish.windowShape;
     overrides.lanczosTolerance = wish.lanczosTolerance;
-    try {
-        request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
-                                      scene.radii[0], integrator.getErrorTolerance(),
-                                      integrator.getTemperature() > 0, 0, false, overrides});
-        factory->adapt(*request);
-        plan(request->box);
-    } catch (const std::invalid_argument& refusal) {
-        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
-    }
+    request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
+                                  scene.radii[0], integrator.getErrorTolerance(),
+                                  integrator.getTemperature() > 0, 0, false, overrides});
+    factory->adapt(*request);
+    plan(request->box);
 }
 
 Lattice HostStepKernel::currentBox() const {
     const OmmVec3* box = data.periodicBoxVectors;
-    return Lattice(fromOpenMM(box[0]), fromOpenMM(box[1]), fromOpenMM(box[2]));
+    try {
+        return Lattice(fromOpenMM(box[0]), fromOpenMM(box[1]), fromOpenMM(box[2]));
+    } catch (const std::invalid_argument& refusal) {
+        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
+    }
 }
 
 void HostStepKernel::plan(const Lattice& box) {
@@ -114,13 +117,9 @@ void HostStepKernel::plan(const Lattice& box) {
 
 void HostStepKernel::followPositions() {
     if (request) {
-        try {
-            const Lattice box = currentBox();
-            if (box != request->box)
-                plan(box);
-        } catch (const std::invalid_argument& refusal) {
-            throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
-        }
+        const Lattice box = currentBox();
+        if (box != request->box)
+            plan(box);
     }
     engine->setPositions(gathered(*data.positions));
 }
@@ -152,7 +151,19 @@ void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what,
 }
 
 void HostStepKernel::checkPositions(ContextImpl&) {
-    requireFinite(gathered(*data.positions), "the position", "nm", "set finite positions");
+    const vector<Vec3> positions = gathered(*data.positions);
+    requireFinite(positions, "the position", "nm", "set finite positions");
+    const OmmVec3* box = data.periodicBoxVectors;
+    const double farthest = FARTHEST * std::max({box[0][0], box[1][1], box[2][2]});
+    for (size_t i = 0; i < positions.size() && request; i++)
+        if (positions[i].cwiseAbs().maxCoeff() > farthest) {
+            std::ostringstream message;
+            message << "PSEBrownianIntegrator: particle " << scene.mobile[i] << " is "
+                    << positions[i].cwiseAbs().maxCoeff() << " nm from the origin, more than "
+                    << FARTHEST << " boxes, and its place in the box is lost to rounding; set "
+                    << "positions nearer to the box";
+            throw OpenMMException(message.str());
+        }
 }
 
 Thermal HostStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sample) const {
@@ -173,6 +184,10 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
                   "its force is too large; use a smaller step size");
 
     const double dt = integrator.getStepSize();
+    vector<Vec3> moved = gathered(*data.positions);
+    for (size_t i = 0; i < velocities.size(); i++)
+        moved[i] += dt * velocities[i];
+    requireFinite(moved, "the next position", "nm", "use a smaller step size");
     for (size_t i = 0; i < velocities.size(); i++) {
         const OmmVec3 u(velocities[i][0], velocities[i][1], velocities[i][2]);
         (*data.positions)[scene.mobile[i]] += u * dt;
@@ -251,15 +266,21 @@ NumericalParameters HostStepKernel::getNumericalParameters() const {
 Plan HostStepKernel::planFor(const Lattice& box) const {
     PlanRequest changed = *request;
     changed.box = box;
-    return makePlan(changed);
+    try {
+        return makePlan(changed);
+    } catch (const std::invalid_argument& refusal) {
+        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
+    }
 }
 
 string HostStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
     text.precision(17);
-    text << "particles " << scene.mobile.size() << " of " << masses.size() << ", split " << p.split
-         << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
+    text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining") << ", viscosity "
+         << viscosity << " Da/(nm ps), first radius " << (scene.radii.empty() ? 0 : scene.radii[0])
+         << " nm, particles " << scene.mobile.size() << " of " << masses.size() << ", split "
+         << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
          << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
          << ", window support " << p.windowSupport << ", window shape " << p.windowShape
          << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision";

@@ -3,6 +3,7 @@
 #include "numerics/Lanczos.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/reference/ReferenceNeighborList.h"
+#include <algorithm>
 #include <cmath>
 #include <deque>
 

@@ -7,10 +7,13 @@
 #include "openmm/Vec3.h"
 #include "openmmpse/internal/windowsExportPSE.h"
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace PSE {
+
+struct Scene;
 
 /**
  * The numerical parameters behind one tolerance: what a Context really uses, or, given to
@@ -226,6 +229,7 @@ private:
     std::map<int, double> particleRadii;
     NumericalParameters requested;
     bool positionsSet = false;
+    std::shared_ptr<const Scene> scene; ///< as it was when the Context was created
     OpenMM::Kernel kernel;
 };
 
