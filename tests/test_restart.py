@@ -147,13 +147,15 @@ def testFreeDrainingCheckpoint(platformName):
 
 # ---------------------------------------------------------------- checkpoints of something else
 
-@pytest.mark.parametrize("what", ["tolerance", "xi", "grid", "window", "model"])
+@pytest.mark.parametrize("what", ["tolerance", "xi", "grid", "window", "model", "viscosity", "radius"])
 def testCheckpointOfAnotherPlanIsRefused(platformName, what):
     """The message names what differs; seed, counters and noise of the Context stay its own."""
     configure = {"tolerance": None,
                  "xi": lambda i: i.setSplittingParameter(1.11),
                  "grid": lambda i: i.setGridDimensions(20, 20, 20),
                  "window": lambda i: i.setWindowSupport(7),
+                 "viscosity": lambda i: i.setViscosity(777.0),
+                 "radius": lambda i: i.setRadius(0.51),
                  "model": lambda i: i.setMobilityModel(PSEBrownianIntegrator.FreeDraining)}[what]
     context, integrator = bondedContext(platformName, seed=77,
                                         tolerance=1e-2 if what == "tolerance" else 1e-3,
