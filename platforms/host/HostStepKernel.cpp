@@ -30,6 +30,10 @@ Vec3 fromOpenMM(const OmmVec3& v) {
     return Vec3(v[0], v[1], v[2]);
 }
 
+OmmVec3 toOpenMM(const Vec3& v) {
+    return OmmVec3(v[0], v[1], v[2]);
+}
+
 template <class T> void write(std::ostream& stream, const T& value) {
     stream.write(reinterpret_cast<const char*>(&value), sizeof(T));
 }
@@ -134,7 +138,7 @@ vector<Vec3> HostStepKernel::gathered(const vector<OmmVec3>& all) const {
 vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double scale) const {
     vector<OmmVec3> all(masses.size());
     for (size_t i = 0; i < mobile.size(); i++)
-        all[scene.mobile[i]] = OmmVec3(mobile[i][0], mobile[i][1], mobile[i][2]) * scale;
+        all[scene.mobile[i]] = toOpenMM(mobile[i]) * scale;
     return all;
 }
 
@@ -188,10 +192,9 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
     for (size_t i = 0; i < velocities.size(); i++)
         moved[i] += dt * velocities[i];
     requireFinite(moved, "the next position", "nm", "use a smaller step size");
-    for (size_t i = 0; i < velocities.size(); i++) {
-        const OmmVec3 u(velocities[i][0], velocities[i][1], velocities[i][2]);
-        (*data.positions)[scene.mobile[i]] += u * dt;
-        (*data.velocities)[scene.mobile[i]] = u;
+    for (size_t i = 0; i < moved.size(); i++) {
+        (*data.positions)[scene.mobile[i]] = toOpenMM(moved[i]);
+        (*data.velocities)[scene.mobile[i]] = toOpenMM(velocities[i]);
     }
     context.computeVirtualSites();
     data.time += dt;
