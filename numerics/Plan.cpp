@@ -92,7 +92,7 @@ std::array<int, 3> gridFor(const Lattice& box, double nyquist, int support) {
 }
 
 double orderedPairs(const PlanRequest& r, double rc, bool sumImages) {
-    const double inRange = r.numParticles / r.box.volume() * 4.0 / 3 * M_PI * rc * rc * rc;
+    const double inRange = meanNeighbours(r.box, r.numParticles, rc);
     // An explicit sum looks at every pair in every image cell that the range touches.
     const double touched = r.numParticles * std::pow(1 + 2 * rc / std::cbrt(r.box.volume()), 3);
     return r.numParticles * (inRange + (sumImages ? 0.5 * touched : 0));
@@ -336,6 +336,10 @@ double inverseFourthPowers(const Lattice& box) {
 }
 
 } // namespace
+
+double meanNeighbours(const Lattice& box, double particles, double range) {
+    return particles / box.volume() * 4.0 / 3 * M_PI * range * range * range;
+}
 
 int nextFftSize(int n) {
     for (;; n++) {

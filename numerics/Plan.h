@@ -64,6 +64,13 @@ struct Plan {
  */
 Plan makePlan(const PlanRequest& request);
 
+/**
+ * Mean number of neighbours of a particle within a range, images included; double, because it may
+ * exceed any integer.
+ * @param range  in nm
+ */
+double meanNeighbours(const Lattice& box, double particles, double range);
+
 /** Smallest number >= n with no prime factor above 7: sizes that every FFT library does fast. */
 int nextFftSize(int n);
 

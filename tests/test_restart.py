@@ -233,6 +233,21 @@ def testStateContinuesTheNoise(platformName):
     assert other.getStepCount() == context.getStepCount() and other.getTime() == context.getTime()
 
 
+@pytest.mark.parametrize("text", ["", "abc", "1.5", "12abc", "-3", "999999999999999999999"])
+def testDamagedNoiseCounterIsRefused(platformName, text):
+    """The counter in the XML of a State is a plain number below 2^48, or it is named."""
+    context, integrator = bondedContext(platformName)
+    run(context, integrator, 4)
+    state = context.getState(positions=True, integratorParameters=True)
+    xml = openmm.XmlSerializer.serialize(state)
+    assert 'noiseStep="4"' in xml
+    damaged = openmm.XmlSerializer.deserialize(xml.replace('noiseStep="4"', f'noiseStep="{text}"'))
+    with pytest.raises(openmm.OpenMMException, match="damaged") as caught:
+        context.setState(damaged)
+    assert f"'{text}'" in str(caught.value)
+    assert np.all(np.isfinite(run(context, integrator, 1)))
+
+
 def testStateDoesNotRepeatTheNoise(platformName, tmp_path):
     """A saved State, loaded into a run of the same seed: no displacement comes again."""
     s = suspension()

@@ -322,8 +322,7 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
         return; // the State of an integrator that has no parameters: nothing to continue
     if (!node.hasProperty("noiseStep"))
         refuse("the State holds the parameters of another integrator; save it without integrator "
-               "parameters, or load it "
-               "with the integrator that wrote it");
+               "parameters, or load it with the integrator that wrote it");
     if (node.getIntProperty("version") != 1)
         refuse("the integrator parameters in this State have version " +
                std::to_string(node.getIntProperty("version")) +

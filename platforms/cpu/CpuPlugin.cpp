@@ -37,7 +37,7 @@ private:
                                          double viscosity, const std::vector<int>& indices,
                                          StageClock& clock) const {
         requireMemory(plan, box, indices.size(),
-                      {CpuWaveSpace<Real>::bytesPerGridPoint(),
+                      {CpuWaveSpace<Real>::bytesPerGridPoint(plan),
                        double(sizeof(PairBlock<Real>)) / PAIR_LANES});
         return std::unique_ptr<MobilityEngine>(
             new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));

@@ -13,6 +13,16 @@ constexpr size_t ROW_UNIT = 16; ///< rows begin on cache lines: 16 floats
 size_t roundedUp(size_t n) {
     return (n + ROW_UNIT - 1) / ROW_UNIT * ROW_UNIT;
 }
+/** Reals from one row of a grid to the next: nz points or modes, and the repeated ends of rows. */
+size_t gridRow(int nz, int support) {
+    return roundedUp(std::max(2 * (nz / 2 + 1), nz + paddedSupport(support)));
+}
+
+/** Modes from one row of a block to the next. */
+size_t modeRow(int nz) {
+    return roundedUp(nz / 2 + 1);
+}
+
 } // namespace
 
 template <class Real>
@@ -20,8 +30,8 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     : box(box), a(plan.a), threads(threads), support(plan.windowSupport),
       padded(paddedSupport(plan.windowSupport)) {
     std::copy(plan.grid.begin(), plan.grid.end(), size);
-    rowLength = roundedUp(std::max(2 * (size[2] / 2 + 1), size[2] + padded));
-    blockLength = roundedUp(size[2] / 2 + 1);
+    rowLength = gridRow(size[2], support);
+    blockLength = modeRow(size[2]);
     for (FftArray<Real>& grid : grids)
         grid.resize(size_t(size[0]) * size[1] * rowLength);
     factors.resize(size_t(size[0]) * size[1] * blockLength);
@@ -40,9 +50,9 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     prepareFactors(plan);
 }
 
-template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint() {
-    return (3 + 0.5) * sizeof(Real) *
-           1.25; // three grids, half a number of factors, padding of rows
+template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan) {
+    const int nz = plan.grid[2];
+    return (3.0 * gridRow(nz, plan.windowSupport) + modeRow(nz)) * sizeof(Real) / nz;
 }
 
 template <class Real> void CpuWaveSpace<Real>::prepareFactors(const Plan& plan) {

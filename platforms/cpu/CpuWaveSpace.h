@@ -19,7 +19,7 @@ template <class Real> class CpuWaveSpace {
 public:
     CpuWaveSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per grid point of everything that grows with the grid. */
-    static double bytesPerGridPoint();
+    static double bytesPerGridPoint(const numerics::Plan& plan);
     void setPositions(const std::vector<numerics::Vec3>& x);
     /**
      * u += M_W f + noise M_W^{1/2} z.

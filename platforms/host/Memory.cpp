@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "Memory.h"
 #include "openmm/OpenMMException.h"
-#include <cmath>
 #include <sstream>
 #include <unistd.h>
 
@@ -17,8 +16,7 @@ void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, siz
     const double available = USABLE * sysconf(_SC_PHYS_PAGES) * double(sysconf(_SC_PAGESIZE));
     const double grid = use.perGridPoint * plan.gridPoints();
     const double range = plan.realCutoff;
-    const double neighbours =
-        particles / box.volume() * 4.0 / 3 * M_PI * range * range * range; // images included
+    const double neighbours = numerics::meanNeighbours(box, particles, range);
     const double pairs = use.perOrderedPair * particles * neighbours;
     if (grid + pairs <= available)
         return;
