@@ -55,46 +55,51 @@ private:
 };
 
 /**
- * Compute result = M^{1/2} z. Space supplies:
+ * Compute result = M^{1/2} z. Basis vector i is basis(i) over its norm; Space supplies
  *
- *     using Vector = ...;                             a vector of the platform, contents kept where
- * they are Vector& basis(int i);                           storage for basis vector i void
- * multiply(const Vector& v, Vector& Mv); double dot(const Vector& v, const Vector& w); accumulated
- * in double void scaledCopy(double s, const Vector& v, Vector& out);        out = s v void
- * addScaled(double s, const Vector& v, Vector& out);         out += s v
+ *     using Vector = ...;      a vector of the platform, contents kept where they are
+ *     Vector& basis(int i);    storage; basis(0) holds z
+ *     double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out);
+ *                              out = s M v + t w; returns v . out
+ *     double addScaled(double s, const Vector& v, Vector& out);   out += s v; returns out . out
+ *     double dot(const Vector& v, const Vector& w);
+ *     void combine(const std::vector<double>& c, Vector& out);    out = sum of c_i basis(i)
+ *
+ * with sums accumulated in double.
  *
  * @param reorthogonalise  against all earlier basis vectors: needed for errors near rounding
  * @return number of iterations
  */
 template <class Space>
-int lanczosSquareRoot(Space& space, const typename Space::Vector& z, typename Space::Vector& result,
-                      double tolerance, double negativeTolerance, bool reorthogonalise) {
-    const double norm = std::sqrt(space.dot(z, z));
-    if (norm == 0) {
-        space.scaledCopy(0, z, result);
+int lanczosSquareRoot(Space& space, typename Space::Vector& result, double tolerance,
+                      double negativeTolerance, bool reorthogonalise) {
+    std::vector<double> norms = {std::sqrt(space.dot(space.basis(0), space.basis(0)))};
+    if (norms[0] == 0) {
+        space.combine({0}, result);
         return 0;
     }
     LanczosTridiagonal small(tolerance, negativeTolerance);
-    space.scaledCopy(1 / norm, z, space.basis(0));
-    double beta = 0;
     for (int i = 0;; i++) {
-        typename Space::Vector& next = space.basis(i + 1);
-        space.multiply(space.basis(i), next);
-        if (i > 0)
-            space.addScaled(-beta, space.basis(i - 1), next);
-        const double alpha = space.dot(space.basis(i), next);
-        space.addScaled(-alpha, space.basis(i), next);
+        typename Space::Vector &current = space.basis(i), &next = space.basis(i + 1);
+        // The norm of the next vector is the off-diagonal entry beta: next = M v_i - beta v_{i-1}.
+        const double overlap =
+            space.multiplyAdd(current, 1 / norms[i], space.basis(i > 0 ? i - 1 : 0),
+                              i > 0 ? -norms[i] / norms[i - 1] : 0, next);
+        const double alpha = overlap / norms[i];
+        double square = space.addScaled(-alpha / norms[i], current, next);
         if (reorthogonalise)
             for (int j = i; j >= 0; j--)
-                space.addScaled(-space.dot(space.basis(j), next), space.basis(j), next);
-        beta = std::sqrt(space.dot(next, next));
+                square = space.addScaled(-space.dot(space.basis(j), next) / (norms[j] * norms[j]),
+                                         space.basis(j), next);
+        const double beta = std::sqrt(square);
         if (small.add(alpha, beta))
             break;
-        space.scaledCopy(1 / beta, next, next);
+        norms.push_back(beta);
     }
-    space.scaledCopy(norm * small.coefficients()[0], space.basis(0), result);
-    for (int i = 1; i < small.iterations(); i++)
-        space.addScaled(norm * small.coefficients()[i], space.basis(i), result);
+    std::vector<double> coefficients;
+    for (int i = 0; i < small.iterations(); i++)
+        coefficients.push_back(norms[0] * small.coefficients()[i] / norms[i]);
+    space.combine(coefficients, result);
     return small.iterations();
 }
 

@@ -29,14 +29,14 @@ double Lattice::smallestWidth() const {
     return boxVectors.diagonal().minCoeff();
 }
 
-Vec3 Lattice::wrapped(const Vec3& x) const {
+Vec3 Lattice::wrappedFractional(const Vec3& x) const {
     Vec3 s = fractional(x);
     for (int d = 0; d < 3; d++) {
         s[d] -= std::floor(s[d]);
         if (s[d] >= 1) // a tiny negative number rounds up to 1
             s[d] = 0;
     }
-    return cartesian(s);
+    return s;
 }
 
 Vec3 Lattice::minimumImage(Vec3 d) const {

@@ -25,6 +25,8 @@ public:
     double volume() const { return boxVectors(0, 0) * boxVectors(1, 1) * boxVectors(2, 2); }
     /** Length of box vector d (not the distance between opposite faces). */
     double length(int d) const { return boxVectors.col(d).norm(); }
+    /** Distance between the two faces that box vector d connects; at most its length. */
+    double width(int d) const { return 1 / inverse.row(d).norm(); }
     /**
      * Smallest diagonal entry: no lattice vector is shorter, and minimumImage() is exact below half
      * of it.
@@ -33,8 +35,10 @@ public:
     /** Coordinates in units of the box vectors, not wrapped. */
     Vec3 fractional(const Vec3& x) const { return inverse * x; }
     Vec3 cartesian(const Vec3& s) const { return boxVectors * s; }
-    /** The image of x in the primary box, fractional coordinates in [0, 1). */
-    Vec3 wrapped(const Vec3& x) const;
+    /** Fractional coordinates of the image of x in the primary box, in [0, 1). */
+    Vec3 wrappedFractional(const Vec3& x) const;
+    /** The image of x in the primary box. */
+    Vec3 wrapped(const Vec3& x) const { return cartesian(wrappedFractional(x)); }
     /** The shortest image of a difference vector, exact if shorter than smallestWidth()/2. */
     Vec3 minimumImage(Vec3 d) const;
     /** 2 pi times the reciprocal vectors, as columns: k = waveVectors()*n with integer n. */

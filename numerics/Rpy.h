@@ -13,25 +13,27 @@ struct PairScalars {
 };
 
 /**
+ * Coefficients of the Rotne-Prager-Yamakawa tensor [T3], for SIMD loops that evaluate many pairs:
+ * F = F1/r + F3/r^3 and G likewise where the spheres are apart, F = 1 + F1 r where they overlap.
+ */
+struct RpyCoefficients {
+    static constexpr double CONTACT = 2;
+    static constexpr double APART_F1 = 0.75, APART_F3 = 0.5, APART_G1 = 1.5, APART_G3 = -1;
+    static constexpr double OVERLAP_F1 = -9.0 / 32, OVERLAP_G1 = -3.0 / 16;
+};
+
+/**
  * Rotne-Prager-Yamakawa mobility of two equal spheres in infinite fluid, for every distance [T3].
  *
  * @param r  distance of the centres in units of the radius, >= 0 (at 0 the self mobility)
  * @return F and G in units of 1/(6 pi eta a)
  */
-template <class Real> inline void rpyScalars(Real r, Real& F, Real& G) {
-    // Both regimes, then a choice: loops over many r stay SIMD. At r = 0 the unused one is
-    // infinite.
-    const Real s = 1 / r;
-    const Real apartF = s * (Real(0.75) + Real(0.5) * s * s), apartG = s * (Real(1.5) - s * s);
-    const Real overlapF = 1 - Real(9.0 / 32) * r, overlapG = 1 - Real(3.0 / 16) * r;
-    F = (r >= 2 ? apartF : overlapF);
-    G = (r >= 2 ? apartG : overlapG);
-}
-
 inline PairScalars rpyScalars(double r) {
-    PairScalars s;
-    rpyScalars(r, s.F, s.G);
-    return s;
+    using c = RpyCoefficients;
+    if (r < c::CONTACT)
+        return {1 + c::OVERLAP_F1 * r, 1 + c::OVERLAP_G1 * r};
+    const double s = 1 / r;
+    return {s * (c::APART_F1 + c::APART_F3 * s * s), s * (c::APART_G1 + c::APART_G3 * s * s)};
 }
 
 } // namespace PSE::numerics

@@ -24,13 +24,21 @@ struct DenseSpace {
     explicit DenseSpace(const MatrixXd& M)
         : M(M), storage(LanczosTridiagonal::MAX_ITERATIONS + 1, VectorXd::Zero(M.rows())) {}
     Vector& basis(int i) { return storage.at(i); }
-    void multiply(const Vector& v, Vector& Mv) {
-        Mv = M * v;
+    double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) {
+        out = s * (M * v) + t * w;
         products++;
+        return v.dot(out);
     }
     double dot(const Vector& v, const Vector& w) { return v.dot(w); }
-    void scaledCopy(double s, const Vector& v, Vector& out) { out = s * v; }
-    void addScaled(double s, const Vector& v, Vector& out) { out += s * v; }
+    double addScaled(double s, const Vector& v, Vector& out) {
+        out += s * v;
+        return out.squaredNorm();
+    }
+    void combine(const std::vector<double>& c, Vector& out) {
+        out = VectorXd::Zero(M.rows());
+        for (size_t i = 0; i < c.size(); i++)
+            out += c[i] * storage[i];
+    }
 
     MatrixXd M;
     std::vector<VectorXd> storage;
@@ -81,10 +89,11 @@ struct Outcome {
 Outcome solve(const MatrixXd& M, const VectorXd& z, double tolerance,
               double negativeTolerance = 1e-12, bool full = true) {
     DenseSpace space(M);
+    space.basis(0) = z;
     Outcome outcome;
     try {
         outcome.iterations =
-            lanczosSquareRoot(space, z, outcome.root, tolerance, negativeTolerance, full);
+            lanczosSquareRoot(space, outcome.root, tolerance, negativeTolerance, full);
         const VectorXd exact = squareRoot(M) * z;
         outcome.error = (outcome.root - exact).norm() / std::max(exact.norm(), 1e-300);
     } catch (const std::runtime_error& e) {

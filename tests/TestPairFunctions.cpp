@@ -137,10 +137,8 @@ TEST(Rpy, ValuesAtSpecialDistances) {
     EXPECT_DOUBLE_EQ(rpyScalars(2.0).G, 0.625);
     EXPECT_NEAR(rpyScalars(1e6).F, 0.75e-6, 1e-17); // Oseen far away
     EXPECT_NEAR(rpyScalars(1e6).G, 1.5e-6, 1e-17);
-    float F, G;
-    rpyScalars(2.5f, F, G);
-    EXPECT_NEAR(F, 0.75 / 2.5 + 0.5 / 15.625, 1e-7);
-    EXPECT_NEAR(G, 1.5 / 2.5 - 1 / 15.625, 1e-7);
+    EXPECT_NEAR(rpyScalars(2.5).F, 0.75 / 2.5 + 0.5 / 15.625, 1e-15);
+    EXPECT_NEAR(rpyScalars(2.5).G, 1.5 / 2.5 - 1 / 15.625, 1e-15);
 }
 
 TEST(Rpy, ValueAndSlopeAreContinuousAtContact) {

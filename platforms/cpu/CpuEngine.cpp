@@ -26,15 +26,21 @@ CpuEngine<Real>::CpuEngine(const Plan& plan, const Lattice& box, double viscosit
     : drag(6 * M_PI * viscosity * plan.a), lanczosTolerance(plan.lanczosTolerance),
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
       negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
-      reorthogonalise(plan.precision == Precision::Double), indices(indices),
-      threads(pool, isSmall(plan, indices.size())), clock(clock),
-      realSpace(plan, box, threads, pool), waveSpace(plan, box, threads) {}
+      reorthogonalise(plan.precision == Precision::Double), indices(indices), box(box),
+      threads(pool, isSmall(plan, indices.size())), clock(clock), realSpace(plan, box, threads),
+      waveSpace(plan, box, threads) {}
 
 template <class Real> void CpuEngine<Real>::setPositions(const std::vector<Vec3>& x) {
     clock.start();
-    realSpace.setPositions(x);
+    const int n = static_cast<int>(x.size());
+    fractions.resize(n);
+    threads.runBlocks(n, [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            fractions[i] = box.wrappedFractional(x[i]);
+    });
+    realSpace.setPositions(fractions);
     clock.charge("neighbours and pair coefficients");
-    waveSpace.setPositions(x);
+    waveSpace.setPositions(fractions);
     clock.charge("window weights");
 }
 
@@ -42,55 +48,87 @@ template <class Real>
 void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const Thermal* thermal,
                                         std::vector<Vec3>& u) {
     const int n = static_cast<int>(indices.size());
-    u.assign(n, Vec3::Zero());
-    double scale = 0; // force unit
-    if (forces != NULL)
-        for (const Vec3& f : *forces)
-            scale = std::max(scale, f.cwiseAbs().maxCoeff());
-    const bool forced = scale > 0;
+    u.resize(n);
     const double thermalForce =
         (thermal == NULL ? 0 : std::sqrt(2 * thermal->kT * drag / thermal->dt));
-    scale = std::max(scale, thermalForce);
-    if (scale == 0)
-        return;
-    velocities.assign(3 * n, Real(0));
-    part.resize(3 * n);
-    scaledForces.resize(3 * n);
+    const double largest = (forces == NULL ? 0 : largestComponent(*forces));
+    const double scale = std::max(largest, thermalForce); // force unit
+    const bool forced = largest > 0;
+    const Real noise = (scale > 0 ? Real(thermalForce / scale) : 0);
+    velocities.assign(3 * size_t(n), Real(0));
     clock.start();
     if (forced) {
-        for (int i = 0; i < n; i++)
-            for (int c = 0; c < 3; c++)
-                scaledForces[3 * i + c] = Real((*forces)[i][c] / scale);
-        addRealForced(scaledForces, velocities);
+        scaledForces.resize(3 * size_t(n));
+        threads.runBlocks(n, [&](int from, int to, int) {
+            for (int i = from; i < to; i++)
+                for (int c = 0; c < 3; c++)
+                    scaledForces[3 * size_t(i) + c] = Real((*forces)[i][c] / scale);
+        });
+        addRealForced();
         clock.charge("real-space velocities");
     }
-    const Real noise = Real(thermalForce / scale);
-    if (thermal != NULL) {
-        addRealThermal(*thermal, noise, velocities);
+    if (noise > 0) {
+        addRealThermal(*thermal, noise);
         clock.charge("real-space noise (Lanczos)");
     }
-    waveSpace.addVelocities(forced ? scaledForces.data() : NULL, noise,
-                            thermal == NULL ? NoiseKey{} : thermal->wave, velocities.data(), clock);
-    for (int i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++)
-            u[i][c] = double(velocities[3 * i + c]) * (scale / drag);
-}
-
-template <class Real> void CpuEngine<Real>::addRealForced(const Vector& forces, Vector& u) {
-    realSpace.multiply(forces, part);
-    realSpace.addScaled(1, part, u);
+    if (scale > 0)
+        waveSpace.addVelocities(forced ? scaledForces.data() : NULL, noise,
+                                noise > 0 ? thermal->wave : NoiseKey{}, velocities.data(), clock);
+    threads.runBlocks(n, [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            for (int c = 0; c < 3; c++)
+                u[i][c] = double(velocities[3 * size_t(i) + c]) * (scale / drag);
+    });
 }
 
 template <class Real>
-void CpuEngine<Real>::addRealThermal(const Thermal& thermal, Real noise, Vector& u) {
-    z.resize(u.size());
-    threads.runBlocks(static_cast<int>(indices.size()), [&](int from, int to, int) {
+double CpuEngine<Real>::largestComponent(const std::vector<Vec3>& forces) const {
+    const int n = static_cast<int>(forces.size());
+    std::vector<double> ofBlock(Threads::blocks(n), 0.0);
+    threads.runBlocks(n, [&](int from, int to, int block) {
         for (int i = from; i < to; i++)
-            particleNoise(thermal.real, indices[i], z.data() + 3 * size_t(i));
+            ofBlock[block] = std::max(ofBlock[block], forces[i].cwiseAbs().maxCoeff());
+    });
+    return ofBlock.empty() ? 0 : *std::max_element(ofBlock.begin(), ofBlock.end());
+}
+
+/** velocities += s times a vector in the places of the real-space half. */
+template <class Real> void CpuEngine<Real>::addFromPlaces(Real s, const Vector& v) {
+    const std::vector<int>& order = realSpace.order();
+    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
+        for (int place = from; place < to; place++)
+            for (int c = 0; c < 3; c++)
+                velocities[3 * size_t(order[place]) + c] += s * v[3 * size_t(place) + c];
+    });
+}
+
+template <class Real> void CpuEngine<Real>::addRealForced() {
+    const std::vector<int>& order = realSpace.order();
+    inPlaces.resize(scaledForces.size());
+    part.resize(scaledForces.size());
+    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
+        for (int place = from; place < to; place++)
+            for (int c = 0; c < 3; c++)
+                inPlaces[3 * size_t(place) + c] = scaledForces[3 * size_t(order[place]) + c];
+    });
+    realSpace.multiplyAdd(inPlaces, 1, inPlaces, 0, part);
+    addFromPlaces(1, part);
+}
+
+template <class Real> void CpuEngine<Real>::addRealThermal(const Thermal& thermal, Real noise) {
+    const std::vector<int>& order = realSpace.order();
+    Vector& z = realSpace.basis(0);
+    particles.resize(order.size());
+    part.resize(z.size());
+    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
+        for (int place = from; place < to; place++)
+            particles[place] = static_cast<uint32_t>(indices[order[place]]);
+        noiseLoops.particleNoise(thermal.real, particles.data() + from, to - from,
+                                 z.data() + 3 * size_t(from));
     });
     iterations =
-        lanczosSquareRoot(realSpace, z, part, lanczosTolerance, negativeTolerance, reorthogonalise);
-    realSpace.addScaled(noise, part, u);
+        lanczosSquareRoot(realSpace, part, lanczosTolerance, negativeTolerance, reorthogonalise);
+    addFromPlaces(noise, part);
 }
 
 template class CpuEngine<float>;

@@ -24,18 +24,25 @@ public:
 
 private:
     using Vector = std::vector<Real>;
-    void addRealForced(const Vector& forces, Vector& u);
-    void addRealThermal(const Thermal& thermal, Real noise, Vector& u);
+    double largestComponent(const std::vector<numerics::Vec3>& forces) const;
+    void addFromPlaces(Real s, const Vector& v);
+    void addRealForced();
+    void addRealThermal(const Thermal& thermal, Real noise);
 
     double drag; ///< 6 pi eta a
     double lanczosTolerance, negativeTolerance;
     bool reorthogonalise;
     std::vector<int> indices;
+    numerics::Lattice box;
     Threads threads;
     StageClock& clock;
     CpuRealSpace<Real> realSpace;
     CpuWaveSpace<Real> waveSpace;
-    Vector scaledForces, velocities, part, z;
+    WaveKernels<Real> noiseLoops = waveKernels<Real>();
+    std::vector<numerics::Vec3> fractions;
+    Vector scaledForces, velocities; ///< [n][3] by particle
+    Vector inPlaces, part;           ///< [n][3] by place of the real-space half
+    std::vector<uint32_t> particles; ///< index in the System, by place
     int iterations = 0;
 };
 

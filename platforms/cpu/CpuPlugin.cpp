@@ -36,9 +36,9 @@ private:
     std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box,
                                          double viscosity, const std::vector<int>& indices,
                                          StageClock& clock) const {
-        requireMemory(plan, box, indices.size(),
-                      {CpuWaveSpace<Real>::bytesPerGridPoint(plan),
-                       double(sizeof(PairBlock<Real>)) / PAIR_LANES});
+        requireMemory(
+            plan, box, indices.size(),
+            {CpuWaveSpace<Real>::bytesPerGridPoint(plan), CpuRealSpace<Real>::BYTES_PER_PAIR});
         return std::unique_ptr<MobilityEngine>(
             new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
     }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "CpuRealSpace.h"
+#include "ParticleOrder.h"
+#include "numerics/RealTable.h"
 #include <algorithm>
 #include <cmath>
 
@@ -9,114 +11,203 @@ namespace PSE {
 
 namespace {
 
-constexpr int LIST_BLOCK = 8; ///< particles per block of OpenMM's list
-/// in radii: the list survives until a particle has moved half of it
-constexpr double SKIN = 0.5;
-/// of the box: what the list's single precision positions may be off
-constexpr double FLOAT_MARGIN = 2e-6;
+/// Cells along the last box vector per range: thin ones, because the cells of a run follow each
+/// other in memory and only its ends are searched in vain.
+constexpr int CELLS_PER_RANGE = 4;
+/// what rounding may do to the reach of the range, in fractions of the box
+constexpr double FRACTION_MARGIN = 1e-8;
+/// room for rows beyond the present need: they fluctuate from step to step
+constexpr double ROOM = 1.05;
 
 /** Powers of a polynomial, highest first. */
 template <class Real> std::vector<Real> hornerOrder(const Polynomial& p) {
     return std::vector<Real>(p.powers.rbegin(), p.powers.rend());
 }
 
+/**
+ * Cells [from, from + number) along one axis, modulo `count`, that the interval s +- reach meets;
+ * reach < 1.
+ */
+struct CellInterval {
+    int from, number, count;
+
+    CellInterval(double s, double reach, int count) : count(count) {
+        // one box up, where truncation rounds down
+        low = static_cast<int>((s - reach + 1) * count);
+        number = std::min(static_cast<int>((s + reach + 1) * count) - low + 1, count);
+        from = (number == count ? 0 : (low >= count ? low - count : low));
+    }
+    int cell(int i) const { return from + i < count ? from + i : from + i - count; }
+    /** Lower bound of the squared distance from s to cell i, for a box of this width. */
+    double squaredDistance(int i, double s, double width) const {
+        const double below = low + i - (s + 1) * count; // in cells
+        const double outside = (number == count ? 0 : std::max({0.0, below, -1 - below}));
+        return outside * outside * (width / count) * (width / count);
+    }
+
+private:
+    int low;
+};
+/// cells of one axis that a range of at most one cell can meet, and one for rounding
+constexpr int MOST_CELLS = 4;
+
 } // namespace
 
 template <class Real>
-CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads,
-                                 OpenMM::ThreadPool& pool)
+CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads)
     : box(box), a(plan.a), range(plan.realCutoff), sumImages(plan.sumImages), threads(threads),
-      pool(pool), list(LIST_BLOCK) {
+      workspaces(threads.count()) {
+    const Matrix3& v = box.vectors();
+    tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
+    for (int d = 0; d < 3; d++)
+        width[d] = box.width(d);
     const RealTable table = makeRealTable(*plan.split, range / a, plan.tableError);
     self = Real(table.self);
     coefficientsF = hornerOrder<Real>(table.F);
     coefficientsC = hornerOrder<Real>(table.C);
-    skin = std::min(SKIN * a, 0.5 * box.smallestWidth() - range);
 }
 
-template <class Real> bool CpuRealSpace<Real>::listIsValid(const std::vector<Vec3>& x) const {
-    if (x.size() != atBuild.size())
-        return false;
-    const double margin = FLOAT_MARGIN * (box.length(0) + box.length(1) + box.length(2));
-    const double allowed = 0.5 * (skin - margin);
-    for (size_t i = 0; i < x.size(); i++)
-        if (!((x[i] - atBuild[i]).squaredNorm() < allowed * std::fabs(allowed)))
-            return false;
-    return true;
+template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
+    const int n = static_cast<int>(fractions.size());
+    rowStart.resize(n);
+    rowCount.resize(n);
+    blocks.resize(Threads::blocks(n));
+    if (sumImages) {
+        fillRowsWithImages(fractions);
+        return;
+    }
+    prepareCells(n);
+    sortByCell(fractions);
+    threads.run(Threads::blocks(n),
+                [&](int task, int thread) { fillRowsOf(task, thread, fractions); });
 }
 
-template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& x) {
-    positions.resize(x.size());
-    for (std::vector<double>& axis : axes)
-        axis.resize(x.size());
-    threads.runBlocks(static_cast<int>(x.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++) {
-            positions[i] = box.wrapped(x[i]);
-            for (int d = 0; d < 3; d++)
-                axes[d][i] = positions[i][d];
-        }
-    });
-    blockCount.resize(x.size());
-    if (sumImages)
-        fillRowsWithImages();
-    else {
-        if (!listIsValid(x))
-            buildList(x);
-        fillRows();
+/** Columns of cells about as wide as the range; not many more cells than particles. */
+template <class Real> void CpuRealSpace<Real>::prepareCells(int particles) {
+    for (int d = 0; d < 3; d++) {
+        reach[d] = range / width[d] + FRACTION_MARGIN;
+        cellCount[d] = std::max(1, static_cast<int>((d < 2 ? 1 : CELLS_PER_RANGE) / reach[d]));
     }
+    const int most = 2 * particles + 1;
+    while (cellCount[0] > most / cellCount[1])
+        for (int d = 0; d < 2; d++)
+            cellCount[d] = (cellCount[d] + 1) / 2;
+    cellCount[2] = std::min(cellCount[2], std::max(1, most / (cellCount[0] * cellCount[1])));
 }
 
-template <class Real> void CpuRealSpace<Real>::buildList(const std::vector<Vec3>& x) {
-    const int n = static_cast<int>(x.size());
-    atBuild.clear(); // no list while it is being built: an exception must not leave half of one
-    if (listPositions.size() != 4 * n) {
-        listPositions.resize(4 * n);
-        noExclusions.resize(n);
-    }
-    // OpenMM's list wants x in [0, ax), y in [0, by), z in [0, cz): a brick, not the primary box.
-    const Matrix3& v = box.vectors();
-    for (int i = 0; i < n; i++) {
-        Vec3 p = positions[i];
-        for (int d = 2; d >= 0; d--)
-            p -= v.col(d) * std::floor(p[d] / v(d, d));
-        for (int d = 0; d < 3; d++)
-            listPositions[4 * i + d] = float(p[d]);
-        listPositions[4 * i + 3] = 0;
-    }
-    OpenMM::Vec3 vectors[3];
-    for (int d = 0; d < 3; d++)
-        vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
-    list.computeNeighborList(n, listPositions, noExclusions, vectors, true, float(range + skin),
-                             pool);
-
-    // From pairs in blocks, each once, to complete rows: count, then fill, then sort each row.
-    candidateStart.assign(n + 1, 0);
-    const auto forEachPair = [&](auto work) {
-        const std::vector<int32_t>& sorted = list.getSortedAtoms();
-        for (int block = 0; block < list.getNumBlocks(); block++) {
-            OpenMM::CpuNeighborList::NeighborIterator neighbours = list.getNeighborIterator(block);
-            while (neighbours.next())
-                for (int k = 0; k < LIST_BLOCK; k++)
-                    if ((neighbours.getExclusions() & (1 << k)) == 0)
-                        work(sorted[LIST_BLOCK * block + k], neighbours.getNeighbor());
-        }
-    };
-    forEachPair([&](int i, int j) { candidateStart[i + 1]++, candidateStart[j + 1]++; });
-    blockStart.assign(n + 1, 0);
-    for (int i = 0; i < n; i++) {
-        blockStart[i + 1] = blockStart[i] + (candidateStart[i + 1] + PAIR_LANES - 1) / PAIR_LANES;
-        candidateStart[i + 1] += candidateStart[i];
-    }
-    candidates.resize(candidateStart[n]);
-    blocks.resize(blockStart[n]);
-    std::vector<int64_t> next(candidateStart.begin(), candidateStart.end() - 1);
-    forEachPair([&](int i, int j) { candidates[next[i]++] = j, candidates[next[j]++] = i; });
+template <class Real> void CpuRealSpace<Real>::sortByCell(const std::vector<Vec3>& fractions) {
+    const int n = static_cast<int>(fractions.size());
+    cellOf.resize(n);
     threads.runBlocks(n, [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            std::sort(candidates.begin() + candidateStart[i],
-                      candidates.begin() + candidateStart[i + 1]);
+        for (int i = from; i < to; i++) {
+            int cell = 0;
+            for (int d = 0; d < 3; d++)
+                cell = cell * cellCount[d] +
+                       std::min(static_cast<int>(fractions[i][d] * cellCount[d]), cellCount[d] - 1);
+            cellOf[i] = cell;
+        }
     });
-    atBuild = x;
+    sortByKey(cellOf, cellCount[0] * cellCount[1] * cellCount[2], cellStart, particleAt);
+    for (auto& axis : axes)
+        axis.resize(n + PAIR_LANES);
+    threads.runBlocks(n, [&](int from, int to, int) {
+        for (int place = from; place < to; place++)
+            for (int d = 0; d < 3; d++)
+                axes[d][place] =
+                    PairCoordinate<Real>::fromFraction(fractions[particleAt[place]][d]);
+    });
+}
+
+/** The runs of places, at most two for each column of cells, that hold all neighbours of s. */
+template <class Real>
+void CpuRealSpace<Real>::findRuns(const Vec3& s, std::vector<PairRun>& runs) const {
+    runs.clear();
+    const CellInterval x(s[0], reach[0], cellCount[0]), y(s[1], reach[1], cellCount[1]),
+        z(s[2], reach[2], cellCount[2]);
+    const int end = z.from + z.number;
+    double y2[MOST_CELLS];
+    for (int j = 0; j < y.number; j++)
+        y2[j] = y.squaredDistance(j, s[1], width[1]);
+    for (int i = 0; i < x.number; i++) {
+        const double x2 = x.squaredDistance(i, s[0], width[0]);
+        for (int j = 0; j < y.number; j++) {
+            if (!tilted && x2 + y2[j] >= range * range)
+                continue; // a corner column that is out of range
+            const int column = x.cell(i) * cellCount[1] + y.cell(j);
+            const int* start = cellStart.data() + size_t(column) * cellCount[2];
+            runs.push_back({start[z.from], start[std::min(end, cellCount[2])]});
+            if (end > cellCount[2])
+                runs.push_back({start[0], start[end - cellCount[2]]});
+        }
+    }
+}
+
+template <class Real>
+void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3>& fractions) {
+    const PairPolynomials<Real> table = polynomials();
+    const PairGeometry<Real> positions = geometry();
+    Workspace& work = workspaces[thread];
+    std::vector<PairBlock<Real>>& mine = blocks[task];
+    const int from = Threads::from(task), to = Threads::to(task, static_cast<int>(rowStart.size()));
+    int used = 0;
+    for (int i = from; i < to; i++) {
+        findRuns(fractions[particleAt[i]], work.runs);
+        size_t candidates = PAIR_LANES;
+        for (const PairRun& run : work.runs)
+            candidates += run.end - run.begin;
+        if (work.neighbours.size() < candidates)
+            work.neighbours.resize(candidates);
+        const size_t needed = used + candidates / PAIR_LANES;
+        if (mine.size() < needed) {
+            const double likely = ROOM * used / (i - from + 1) * (to - from);
+            mine.reserve(std::max(needed, static_cast<size_t>(likely)));
+            mine.resize(mine.capacity());
+        }
+        rowStart[i] = used;
+        rowCount[i] = kernels.fillRow(positions, table, i, work.runs.data(),
+                                      static_cast<int>(work.runs.size()), work.neighbours.data(),
+                                      mine.data() + used);
+        used += rowCount[i];
+    }
+}
+
+/**
+ * For ranges beyond half the box: every image of every pair. Few particles, or a range never chosen
+ * automatically.
+ */
+template <class Real>
+void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) {
+    const PairPolynomials<Real> table = polynomials();
+    const std::vector<Vec3> images = box.imagesWithin(range);
+    const int n = static_cast<int>(fractions.size());
+    particleAt.resize(n);
+    for (int i = 0; i < n; i++)
+        particleAt[i] = i;
+    threads.run(Threads::blocks(n), [&](int task, int) {
+        std::vector<PairBlock<Real>>& mine = blocks[task];
+        mine.clear();
+        for (int i = Threads::from(task); i < Threads::to(task, n); i++) {
+            rowStart[i] = static_cast<int32_t>(mine.size());
+            int used = PAIR_LANES;
+            for (int j = 0; j < n; j++)
+                for (const Vec3& image : images) {
+                    const Vec3 d = box.vectors() * (fractions[i] - fractions[j]) + image;
+                    if (d.squaredNorm() >= range * range || (i == j && image == Vec3::Zero()))
+                        continue;
+                    if (used == PAIR_LANES) {
+                        mine.push_back({});
+                        used = 0;
+                    }
+                    PairBlock<Real>& block = mine.back();
+                    block.offset[used] = 3 * j;
+                    block.dx[used] = Real(d[0] / a);
+                    block.dy[used] = Real(d[1] / a);
+                    block.dz[used++] = Real(d[2] / a);
+                }
+            rowCount[i] = static_cast<int32_t>(mine.size()) - rowStart[i];
+            kernels.evaluateBlocks(table, rowCount[i], used, mine.data() + rowStart[i]);
+        }
+    });
 }
 
 template <class Real> PairPolynomials<Real> CpuRealSpace<Real>::polynomials() const {
@@ -124,85 +215,30 @@ template <class Real> PairPolynomials<Real> CpuRealSpace<Real>::polynomials() co
             coefficientsF.data(), coefficientsC.data()};
 }
 
-template <class Real> void CpuRealSpace<Real>::fillRows() {
-    const PairPolynomials<Real> table = polynomials();
-    const Matrix3& v = box.vectors();
-    const PairGeometry geometry = {
-        axes[0].data(), axes[1].data(),
-        axes[2].data(), {v(0, 0), v(0, 1), v(1, 1), v(0, 2), v(1, 2), v(2, 2)},
-        range,          a};
-    threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            blockCount[i] = simd.fillRow(geometry, table, i, candidates.data() + candidateStart[i],
-                                         int(candidateStart[i + 1] - candidateStart[i]),
-                                         blocks.data() + blockStart[i]);
-    });
+template <class Real> PairGeometry<Real> CpuRealSpace<Real>::geometry() const {
+    const Matrix3 v = box.vectors() / a;
+    const auto unit = [](double length) { return Real(length * PairCoordinate<Real>::UNIT); };
+    return {
+        axes[0].data(),
+        axes[1].data(),
+        axes[2].data(),
+        {unit(v(0, 0)), unit(v(0, 1)), unit(v(1, 1)), unit(v(0, 2)), unit(v(1, 2)), unit(v(2, 2))},
+        {Real(v(0, 0)), Real(v(0, 1)), Real(v(1, 1))},
+        tilted,
+        Real(range / a)};
 }
 
-/**
- * For ranges beyond half the box: every image of every pair. Few particles, or a range never chosen
- * automatically.
- */
-template <class Real> void CpuRealSpace<Real>::fillRowsWithImages() {
-    const PairPolynomials<Real> table = polynomials();
-    const std::vector<Vec3> images = box.imagesWithin(range);
-    const int n = static_cast<int>(positions.size());
-    std::vector<std::vector<PairBlock<Real>>> found(n);
-    threads.run(n, [&](int i, int) {
-        int used = PAIR_LANES;
-        for (int j = 0; j < n; j++)
-            for (const Vec3& image : images) {
-                const Vec3 d = positions[i] - positions[j] + image;
-                if (d.squaredNorm() >= range * range || (i == j && image == Vec3::Zero()))
-                    continue;
-                if (used == PAIR_LANES) {
-                    found[i].push_back({});
-                    used = 0;
-                }
-                PairBlock<Real>& block = found[i].back();
-                block.neighbour[used] = j;
-                block.dx[used] = Real(d[0] / a);
-                block.dy[used] = Real(d[1] / a);
-                block.dz[used++] = Real(d[2] / a);
-            }
-        simd.evaluateBlocks(table, static_cast<int>(found[i].size()), used, found[i].data());
-    });
-    blockStart.assign(n + 1, 0);
-    blocks.clear();
-    for (int i = 0; i < n; i++) {
-        blockCount[i] = static_cast<int32_t>(found[i].size());
-        blockStart[i + 1] = blockStart[i] + blockCount[i];
-        blocks.insert(blocks.end(), found[i].begin(), found[i].end());
-    }
+template <class Real> PairRows<Real> CpuRealSpace<Real>::rows(int task) const {
+    return {self, rowStart.data(), rowCount.data(), blocks[task].data()};
 }
 
-template <class Real> PairRows<Real> CpuRealSpace<Real>::rows() const {
-    return {self, blockStart.data(), blockCount.data(), blocks.data()};
-}
-
-template <class Real> void CpuRealSpace<Real>::multiply(const Vector& v, Vector& out) const {
-    const PairRows<Real> matrix = rows();
-    threads.runBlocks(static_cast<int>(positions.size()), [&](int from, int to, int) {
-        simd.multiplyRows(matrix, from, to, v.data(), out.data());
-    });
-}
-
-template <class Real> typename CpuRealSpace<Real>::Vector& CpuRealSpace<Real>::basis(int i) {
-    while (static_cast<int>(krylov.size()) <= i)
-        krylov.emplace_back();
-    krylov[i].resize(3 * positions.size());
-    return krylov[i];
-}
-
-template <class Real> double CpuRealSpace<Real>::dot(const Vector& v, const Vector& w) const {
-    const int n = static_cast<int>(v.size());
-    partial.assign(Threads::blocks(n), 0.0);
-    threads.runBlocks(n, [&](int from, int to, int block) {
-        double sum = 0;
-        for (int i = from; i < to; i++)
-            sum += double(v[i]) * double(w[i]);
-        partial[block] = sum;
-    });
+/** The sum of what work(from, to, task) returns, in the order of the tasks. */
+template <class Real>
+template <class Work>
+double CpuRealSpace<Real>::sumOverTasks(Work work) const {
+    const int n = static_cast<int>(rowStart.size());
+    partial.resize(Threads::blocks(n));
+    threads.runBlocks(n, [&](int from, int to, int task) { partial[task] = work(from, to, task); });
     double total = 0;
     for (double sum : partial)
         total += sum;
@@ -210,18 +246,43 @@ template <class Real> double CpuRealSpace<Real>::dot(const Vector& v, const Vect
 }
 
 template <class Real>
-void CpuRealSpace<Real>::scaledCopy(double s, const Vector& v, Vector& out) const {
-    threads.runBlocks(static_cast<int>(v.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            out[i] = Real(s) * v[i];
+double CpuRealSpace<Real>::multiplyAdd(const Vector& v, double s, const Vector& w, double t,
+                                       Vector& out) const {
+    return sumOverTasks([&](int from, int to, int task) {
+        return kernels.multiplyRows(rows(task), from, to, v.data(), Real(s), w.data(), Real(t),
+                                    out.data());
+    });
+}
+
+template <class Real> typename CpuRealSpace<Real>::Vector& CpuRealSpace<Real>::basis(int i) {
+    while (static_cast<int>(krylov.size()) <= i)
+        krylov.emplace_back();
+    krylov[i].resize(3 * rowStart.size() + 1); // kernels read one number beyond
+    return krylov[i];
+}
+
+template <class Real> double CpuRealSpace<Real>::dot(const Vector& v, const Vector& w) const {
+    return sumOverTasks([&](int from, int to, int) {
+        return kernels.dot(3 * (to - from), v.data() + 3 * size_t(from),
+                           w.data() + 3 * size_t(from));
     });
 }
 
 template <class Real>
-void CpuRealSpace<Real>::addScaled(double s, const Vector& v, Vector& out) const {
-    threads.runBlocks(static_cast<int>(v.size()), [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            out[i] += Real(s) * v[i];
+double CpuRealSpace<Real>::addScaled(double s, const Vector& v, Vector& out) const {
+    return sumOverTasks([&](int from, int to, int) {
+        return kernels.addScaled(3 * (to - from), Real(s), v.data() + 3 * size_t(from),
+                                 out.data() + 3 * size_t(from));
+    });
+}
+
+template <class Real>
+void CpuRealSpace<Real>::combine(const std::vector<double>& coefficients, Vector& out) const {
+    threads.runBlocks(static_cast<int>(rowStart.size()), [&](int from, int to, int) {
+        std::fill(out.begin() + 3 * size_t(from), out.begin() + 3 * size_t(to), Real(0));
+        for (size_t k = 0; k < coefficients.size(); k++)
+            for (size_t i = 3 * size_t(from); i < 3 * size_t(to); i++)
+                out[i] += Real(coefficients[k]) * krylov[k][i];
     });
 }
 

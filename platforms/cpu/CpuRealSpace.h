@@ -2,68 +2,80 @@
 #ifndef OPENMMPSE_CPUREALSPACE_H_
 #define OPENMMPSE_CPUREALSPACE_H_
 
-#include "SimdKernels.h"
+#include "PairKernels.h"
 #include "Threads.h"
+#include "numerics/Lattice.h"
 #include "numerics/Plan.h"
-#include "numerics/RealTable.h"
-#include "openmm/cpu/AlignedArray.h"
-#include "openmm/cpu/CpuNeighborList.h"
+#include "numerics/Vec3.h"
 #include <deque>
-#include <set>
+#include <vector>
 
 namespace PSE {
 
 /**
- * The real-space half as a sparse matrix of 3x3 blocks [T7], from OpenMM's neighbour list with a
- * skin. Rows are complete and in the order of particle indices, cut exactly at the range: the
- * result depends on the current positions alone, not on when the list was built nor on threads.
- * Mobilities in units of 1/(6 pi eta a).
+ * The real-space half as a sparse matrix of 3x3 blocks [T7]. Neighbours are found anew for all
+ * positions by a search over cells: Brownian steps are so long that a list with a skin would
+ * hardly outlive one. Everything depends on the current positions alone, not on earlier ones nor
+ * on threads. Mobilities in units of 1/(6 pi eta a).
+ *
+ * Vectors hold three numbers for each place: particles are sorted by cells, so that neighbours lie
+ * close in memory.
  */
 template <class Real> class CpuRealSpace {
 public:
     using Vector = std::vector<Real>;
 
-    CpuRealSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads,
-                 OpenMM::ThreadPool& pool);
-    void setPositions(const std::vector<numerics::Vec3>& x);
+    CpuRealSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
+    /** Bytes per particle and neighbour. */
+    static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES;
+    /** @param fractions  coordinates along the box vectors, in [0, 1) */
+    void setPositions(const std::vector<numerics::Vec3>& fractions);
+    /** The particle at each place. */
+    const std::vector<int>& order() const { return particleAt; }
 
-    /** out = M_R v, both [n][3]. */
-    void multiply(const Vector& v, Vector& out) const;
+    /** out = s M_R v + t w. @return v . out */
+    double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const;
 
     // The vector operations of lanczosSquareRoot(); sums are taken block by block, in an order of
     // their own.
     Vector& basis(int i);
     double dot(const Vector& v, const Vector& w) const;
-    void scaledCopy(double s, const Vector& v, Vector& out) const;
-    void addScaled(double s, const Vector& v, Vector& out) const;
+    double addScaled(double s, const Vector& v, Vector& out) const;
+    void combine(const std::vector<double>& coefficients, Vector& out) const;
 
 private:
-    bool listIsValid(const std::vector<numerics::Vec3>& x) const;
-    void buildList(const std::vector<numerics::Vec3>& x);
-    void fillRows();
-    void fillRowsWithImages();
+    void prepareCells(int particles);
+    void sortByCell(const std::vector<numerics::Vec3>& fractions);
+    void fillRows(const std::vector<numerics::Vec3>& fractions);
+    void fillRowsOf(int task, int thread, const std::vector<numerics::Vec3>& fractions);
+    void findRuns(const numerics::Vec3& s, std::vector<PairRun>& runs) const;
+    void fillRowsWithImages(const std::vector<numerics::Vec3>& fractions);
     PairPolynomials<Real> polynomials() const;
-    PairRows<Real> rows() const;
+    PairGeometry<Real> geometry() const;
+    PairRows<Real> rows(int task) const;
+    template <class Work> double sumOverTasks(Work work) const;
+
+    /** What a thread needs to fill rows. */
+    struct Workspace {
+        std::vector<PairRun> runs;
+        std::vector<int32_t> neighbours;
+    };
 
     numerics::Lattice box;
-    double a, range, skin;
-    bool sumImages;
+    double a, range;
+    bool sumImages, tilted;
+    double width[3]; ///< distances between opposite faces of the box
     const Threads& threads;
-    const SimdKernels<Real>& simd = simdKernels<Real>();
-    OpenMM::ThreadPool& pool;
+    PairKernels<Real> kernels = pairKernels<Real>();
     Real self;
-    std::vector<Real> coefficientsF, coefficientsC;
-    OpenMM::CpuNeighborList list;
-    OpenMM::AlignedArray<float> listPositions;
-    std::vector<std::set<int>> noExclusions;
-    std::vector<numerics::Vec3> positions; ///< in the primary box
-    std::vector<double> axes[3];           ///< the same, one array per coordinate
-    std::vector<numerics::Vec3> atBuild;   ///< as given when the list was built
-    std::vector<int32_t> candidates;       ///< neighbours within range + skin, row by row
-    std::vector<int64_t> candidateStart;   ///< [n + 1]
-    std::vector<int64_t> blockStart;       ///< [n + 1]
-    std::vector<int32_t> blockCount;
-    std::vector<PairBlock<Real>> blocks;
+    Vector coefficientsF, coefficientsC;
+    double reach[3];  ///< of the range, in fractions of the box
+    int cellCount[3]; ///< cells along the box vectors
+    std::vector<int> particleAt, cellOf, cellStart;
+    std::vector<typename PairCoordinate<Real>::Type> axes[3];
+    std::vector<std::vector<PairBlock<Real>>> blocks; ///< one array per task of Threads::runBlocks
+    std::vector<int32_t> rowStart, rowCount;          ///< [n], in the blocks of the row's task
+    std::vector<Workspace> workspaces;                ///< one per thread
     std::deque<Vector> krylov;
     mutable std::vector<double> partial;
 };

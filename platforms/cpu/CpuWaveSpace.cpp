@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "CpuWaveSpace.h"
+#include "ParticleOrder.h"
 #include "numerics/Window.h"
 #include <algorithm>
 #include <cmath>
@@ -9,18 +10,26 @@ using namespace PSE::numerics;
 namespace PSE {
 
 namespace {
+
 constexpr size_t ROW_UNIT = 16; ///< rows begin on cache lines: 16 floats
-size_t roundedUp(size_t n) {
-    return (n + ROW_UNIT - 1) / ROW_UNIT * ROW_UNIT;
-}
-/** Reals from one row of a grid to the next: nz points or modes, and the repeated ends of rows. */
-size_t gridRow(int nz, int support) {
-    return roundedUp(std::max(2 * (nz / 2 + 1), nz + paddedSupport(support)));
+size_t roundedUp(size_t n, size_t unit) {
+    return (n + unit - 1) / unit * unit;
 }
 
-/** Modes from one row of a block to the next. */
-size_t modeRow(int nz) {
-    return roundedUp(nz / 2 + 1);
+int waveChunks(int nz) {
+    return (nz / 2 + WAVE_LANES) / WAVE_LANES;
+}
+
+/** Reals from one row of a grid to the next: whole chunks of modes, or points and repeated ends. */
+size_t gridRow(int nz, int support) {
+    return roundedUp(std::max(2 * WAVE_LANES * waveChunks(nz), nz + paddedSupport(support)),
+                     ROW_UNIT);
+}
+
+/** From one plane to the next: an odd number of units, so that columns spread over the caches. */
+size_t gridPlane(int ny, size_t rowLength) {
+    const size_t units = ny * rowLength / ROW_UNIT;
+    return (units + 1 - units % 2) * ROW_UNIT;
 }
 
 } // namespace
@@ -30,15 +39,20 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     : box(box), a(plan.a), threads(threads), support(plan.windowSupport),
       padded(paddedSupport(plan.windowSupport)) {
     std::copy(plan.grid.begin(), plan.grid.end(), size);
+    chunks = waveChunks(size[2]);
     rowLength = gridRow(size[2], support);
-    blockLength = modeRow(size[2]);
-    for (FftArray<Real>& grid : grids)
-        grid.resize(size_t(size[0]) * size[1] * rowLength);
-    factors.resize(size_t(size[0]) * size[1] * blockLength);
-    for (int i = 0; i < threads.count(); i++)
-        blocks.emplace_back(
-            new FftArray<Real>(3 * 2 * size[0] * blockLength + waveScratch(blockLength)));
-    fft.reset(new GridFft<Real>(size[0], size[1], size[2], rowLength, blockLength));
+    planeLength = gridPlane(size[1], rowLength);
+    for (FftArray<Real>& grid : grids) {
+        grid.resize(size[0] * planeLength);
+        std::fill(grid.begin(), grid.begin() + size[0] * planeLength, Real(0));
+    }
+    factors.resize(factorRow(size[1], 0, 0));
+    const size_t room = std::max(4 * planeLength, size_t(3 * 2) * size[0] * WAVE_LANES);
+    for (int i = 0; i < threads.count(); i++) {
+        scratch.emplace_back(new FftArray<Real>(room));
+        std::fill(scratch[i]->begin(), scratch[i]->begin() + room, Real(0));
+    }
+    fft.reset(new GridFft<Real>({{size[0], size[1], size[2]}, rowLength, planeLength, WAVE_LANES}));
 
     const std::vector<Polynomial> pieces =
         Window(support, plan.windowShape).polynomials(plan.tableError);
@@ -51,8 +65,10 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
 }
 
 template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan) {
-    const int nz = plan.grid[2];
-    return (3.0 * gridRow(nz, plan.windowSupport) + modeRow(nz)) * sizeof(Real) / nz;
+    const int ny = plan.grid[1], nz = plan.grid[2];
+    const double plane = gridPlane(ny, gridRow(nz, plan.windowSupport)),
+                 factors = double(ny) * waveChunks(nz) * WAVE_LANES;
+    return (3 * plane + factors) * sizeof(Real) / (double(ny) * nz);
 }
 
 template <class Real> void CpuWaveSpace<Real>::prepareFactors(const Plan& plan) {
@@ -60,140 +76,129 @@ template <class Real> void CpuWaveSpace<Real>::prepareFactors(const Plan& plan) 
     std::vector<double> inverse[3]; // 1/W^ of each axis
     for (int d = 0; d < 3; d++)
         for (int i = 0; i < size[d]; i++)
-            inverse[d].push_back(
-                1 / window.transform(2 * M_PI * (2 * i <= size[d] ? i : i - size[d]) / size[d]));
+            inverse[d].push_back(1 / window.transform(2 * M_PI * waveIndex(d, i) / size[d]));
     const Matrix3 waves = a * box.waveVectors();
     const double unit = 6 * M_PI * a * a * a / box.volume();
+    keptChunks.assign(size[1], 0);
     threads.run(size[1], [&](int y, int) {
-        const int ny = (2 * y <= size[1] ? y : y - size[1]);
+        const int ny = waveIndex(1, y);
         for (int x = 0; x < size[0]; x++) {
-            const int nx = (2 * x <= size[0] ? x : x - size[0]);
-            Real* row = factors.begin() + (size_t(y) * size[0] + x) * blockLength;
-            for (size_t nz = 0; nz < blockLength; nz++) {
-                row[nz] = 0;
+            const int nx = waveIndex(0, x);
+            for (int nz = 0; nz < chunks * WAVE_LANES; nz++) {
+                const int chunk = nz / WAVE_LANES;
+                Real& factor = factors[factorRow(y, chunk, x) + nz % WAVE_LANES];
+                factor = 0;
                 // No mean flow, no Nyquist planes (there n and -n coincide on the grid but not in
                 // k), no padding.
                 const bool zero = (nx == 0 && ny == 0 && nz == 0);
-                if (zero || 2 * nx == size[0] || 2 * ny == size[1] || 2 * int(nz) >= size[2])
+                if (zero || 2 * nx == size[0] || 2 * ny == size[1] || 2 * nz >= size[2])
                     continue;
                 const double k = (waves * Vec3(nx, ny, double(nz))).norm();
                 const double deconvolution = inverse[0][x] * inverse[1][y] * inverse[2][nz];
-                row[nz] = Real(unit * plan.split->waveWeight(k) / (k * k) * deconvolution *
-                               deconvolution);
+                factor = Real(unit * plan.split->waveWeight(k) / (k * k) * deconvolution *
+                              deconvolution);
+                if (factor > 0)
+                    keptChunks[y] = std::max(keptChunks[y], chunk + 1);
             }
         }
     });
 }
 
-template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Vec3>& x) {
-    const int n = static_cast<int>(x.size());
-    first.resize(3 * n);
-    sortedFirst.resize(3 * n);
-    offsets.resize(3 * n);
+template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
+    const int n = static_cast<int>(fractions.size());
     columnOf.resize(n);
-    order.resize(n);
+    first.resize(3 * n);
+    offsets.resize(3 * n);
     weights.resize(3 * size_t(n) * padded);
-    std::vector<Real> unsorted(3 * n);
+    // The window of a particle at u, in grid units, begins at ceil(u - P/2).
+    const auto begin = [&](double u) { return static_cast<int>(std::ceil(u - 0.5 * support)); };
+    const auto wrapped = [&](int d, int i) { return i < 0 ? i + size[d] : i; };
     threads.runBlocks(n, [&](int from, int to, int) {
-        for (int i = from; i < to; i++) {
-            const Vec3 s = box.fractional(x[i]);
-            for (int d = 0; d < 3; d++) {
-                const double u = (s[d] - std::floor(s[d])) * size[d],
-                             begin = std::ceil(u - 0.5 * support);
-                unsorted[3 * i + d] = Real(2 * (begin - u) + support - 1);
-                first[3 * i + d] = (static_cast<int>(begin) + 2 * size[d]) % size[d];
-            }
-            columnOf[i] = first[3 * i] * size[1] + first[3 * i + 1];
-        }
+        for (int i = from; i < to; i++)
+            columnOf[i] = wrapped(0, begin(fractions[i][0] * size[0])) * size[1] +
+                          wrapped(1, begin(fractions[i][1] * size[1]));
     });
-    sortByColumn();
+    sortByKey(columnOf, size[0] * size[1], columnStart, order);
     const WindowPolynomials<Real> window = {windowDegree, padded, windowCoefficients.data()};
     threads.runBlocks(n, [&](int from, int to, int) {
         for (int slot = from; slot < to; slot++)
             for (int d = 0; d < 3; d++) {
-                sortedFirst[3 * slot + d] = first[3 * order[slot] + d];
-                offsets[3 * slot + d] = unsorted[3 * order[slot] + d];
+                const double u = fractions[order[slot]][d] * size[d];
+                first[3 * slot + d] = wrapped(d, begin(u));
+                offsets[3 * slot + d] = Real(2 * (begin(u) - u) + support - 1);
             }
-        simd.evaluateWindows(window, offsets.data() + 3 * from, to - from,
-                             weights.data() + 3 * size_t(from) * padded);
+        gridLoops.evaluateWindows(window, offsets.data() + 3 * from, to - from,
+                                  weights.data() + 3 * size_t(from) * padded);
     });
 }
 
-/** Counting sort, stable in the particle index: the order depends on the positions alone. */
-template <class Real> void CpuWaveSpace<Real>::sortByColumn() {
-    columnStart.assign(size_t(size[0]) * size[1] + 1, 0);
-    for (int column : columnOf)
-        columnStart[column + 1]++;
-    for (size_t i = 1; i < columnStart.size(); i++)
-        columnStart[i] += columnStart[i - 1];
-    std::vector<int> next(columnStart.begin(), columnStart.end() - 1);
-    for (size_t i = 0; i < columnOf.size(); i++)
-        order[next[columnOf[i]]++] = static_cast<int>(i);
-}
-
 template <class Real> GridParticles<Real> CpuWaveSpace<Real>::particles() const {
-    return {support,
-            padded,
-            {size[0], size[1], size[2]},
-            rowLength,
-            columnStart.data(),
-            sortedFirst.data(),
-            weights.data(),
-            sortedForces.data()};
+    return {support,      padded,         {size[0], size[1], size[2]},
+            rowLength,    planeLength,    columnStart.data(),
+            first.data(), weights.data(), sortedForces.data()};
 }
 
 template <class Real> void CpuWaveSpace<Real>::spread(const Real* forces) {
+    const int n = static_cast<int>(order.size());
     sortedForces.resize(3 * order.size());
-    for (size_t slot = 0; slot < order.size(); slot++)
-        for (int c = 0; c < 3; c++)
-            sortedForces[3 * slot + c] = forces[3 * size_t(order[slot]) + c];
+    threads.runBlocks(n, [&](int from, int to, int) {
+        for (int slot = from; slot < to; slot++)
+            for (int c = 0; c < 3; c++)
+                sortedForces[3 * size_t(slot) + c] = forces[3 * size_t(order[slot]) + c];
+    });
     const GridParticles<Real> sorted = particles();
     // A plane belongs to one task, which adds the particles in their order: no two threads write
     // one number.
-    threads.run(size[0], [&](int x, int) {
-        const size_t plane = size_t(x) * size[1] * rowLength;
-        Real* planes[3] = {grids[0].begin() + plane, grids[1].begin() + plane,
-                           grids[2].begin() + plane};
-        simd.spreadPlane(sorted, x, planes);
-        for (Real* p : planes)
-            fft->planeForward(p);
+    threads.run(size[0], [&](int x, int thread) {
+        Real* const own = scratch[thread]->begin();
+        Real* const planes[3] = {own, own + planeLength, own + 2 * planeLength};
+        gridLoops.spreadPlane(sorted, x, planes);
+        for (int c = 0; c < 3; c++)
+            fft->planeForward(planes[c], own + 3 * planeLength, grids[c].begin() + x * planeLength);
     });
 }
 
 template <class Real> void CpuWaveSpace<Real>::scale(bool forced, Real noise, const NoiseKey& key) {
+    WaveColumns<Real> columns = {size[0], 0, 0, {}, nullptr, forced, noise, key};
     const Matrix3 waves = a * box.waveVectors();
-    threads.run(size[1], [&](int y, int thread) {
-        WaveRow<Real> row = {{size[0], size[1], size[2]},
-                             2 * y <= size[1] ? y : y - size[1],
-                             blockLength,
-                             {},
-                             nullptr,
-                             forced,
-                             noise,
-                             key};
-        for (int i = 0; i < 9; i++)
-            row.waveVectors[i] = Real(waves(i / 3, i % 3));
-        row.factors = factors.begin() + size_t(y) * size[0] * blockLength;
-        Complex* columns[3];
+    for (int i = 0; i < 9; i++)
+        columns.waveVectors[i] = Real(waves(i / 3, i % 3));
+    threads.run(size[1], [&](int y, int thread) { scaleLine(y, thread, columns); });
+}
+
+/** All columns of modes at one y. */
+template <class Real>
+void CpuWaveSpace<Real>::scaleLine(int y, int thread, WaveColumns<Real> columns) {
+    columns.ny = waveIndex(1, y);
+    Complex* blocks[3];
+    for (int c = 0; c < 3; c++)
+        blocks[c] = reinterpret_cast<Complex*>(scratch[thread]->begin()) + c * size[0] * WAVE_LANES;
+    for (int chunk = 0; chunk < keptChunks[y]; chunk++) {
+        columns.firstZ = chunk * WAVE_LANES;
+        columns.factors = factors.begin() + factorRow(y, chunk, 0);
+        const size_t corner = y * rowLength + 2 * columns.firstZ;
+        for (int c = 0; c < 3 && columns.forced; c++)
+            fft->columnForward(grids[c].begin() + corner, blocks[c]);
+        waveLoops.scaleColumns(columns, blocks);
         for (int c = 0; c < 3; c++)
-            columns[c] =
-                reinterpret_cast<Complex*>(blocks[thread]->begin()) + c * size[0] * blockLength;
-        Real* scratch = blocks[thread]->begin() + 3 * 2 * size[0] * blockLength;
-        for (int c = 0; c < 3 && forced; c++)
-            fft->columnForward(grids[c].begin() + y * rowLength, columns[c]);
-        simd.scaleWaves(row, columns, scratch);
-        for (int c = 0; c < 3; c++)
-            fft->columnBackward(columns[c], grids[c].begin() + y * rowLength);
-    });
+            fft->columnBackward(blocks[c], grids[c].begin() + corner);
+    }
+    const size_t kept = size_t(2 * WAVE_LANES) * keptChunks[y],
+                 all = size_t(2 * WAVE_LANES) * chunks;
+    for (FftArray<Real>& grid : grids)
+        for (int x = 0; x < size[0] && kept < all; x++) {
+            Real* const row = grid.begin() + x * planeLength + y * rowLength;
+            std::fill(row + kept, row + all, Real(0));
+        }
 }
 
 template <class Real> void CpuWaveSpace<Real>::gather(Real* u) {
-    threads.run(size[0], [&](int x, int) {
+    threads.run(size[0], [&](int x, int thread) {
         for (FftArray<Real>& grid : grids) {
-            Real* plane = grid.begin() + size_t(x) * size[1] * rowLength;
-            fft->planeBackward(plane);
+            Real* const plane = grid.begin() + x * planeLength;
+            fft->planeBackward(plane, scratch[thread]->begin());
             for (int y = 0; y < size[1]; y++) {
-                Real* row = plane + y * rowLength;
+                Real* const row = plane + y * rowLength;
                 for (int z = size[2]; z < size[2] + padded; z++)
                     row[z] = row[z - size[2]];
             }
@@ -203,7 +208,7 @@ template <class Real> void CpuWaveSpace<Real>::gather(Real* u) {
     const GridParticles<Real> sorted = particles();
     const Real* data[3] = {grids[0].begin(), grids[1].begin(), grids[2].begin()};
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
-        simd.gatherVelocities(sorted, from, to, data, sortedVelocities.data());
+        gridLoops.gatherVelocities(sorted, from, to, data, sortedVelocities.data());
         for (int slot = from; slot < to; slot++)
             for (int c = 0; c < 3; c++)
                 u[3 * size_t(order[slot]) + c] += sortedVelocities[3 * size_t(slot) + c];

@@ -3,10 +3,14 @@
 #define OPENMMPSE_CPUWAVESPACE_H_
 
 #include "Fft.h"
-#include "SimdKernels.h"
-#include "Threads.h"
+#include "GridKernels.h"
 #include "MobilityEngine.h"
+#include "Threads.h"
+#include "WaveKernels.h"
+#include "numerics/Lattice.h"
+#include "numerics/Plan.h"
 #include <memory>
+#include <vector>
 
 namespace PSE {
 
@@ -20,7 +24,8 @@ public:
     CpuWaveSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per grid point of everything that grows with the grid. */
     static double bytesPerGridPoint(const numerics::Plan& plan);
-    void setPositions(const std::vector<numerics::Vec3>& x);
+    /** @param fractions  coordinates along the box vectors, in [0, 1) */
+    void setPositions(const std::vector<numerics::Vec3>& fractions);
     /**
      * u += M_W f + noise M_W^{1/2} z.
      * @param forces  [n][3], or NULL
@@ -32,25 +37,33 @@ public:
 private:
     using Complex = std::complex<Real>;
     void prepareFactors(const numerics::Plan& plan);
-    void sortByColumn();
+    size_t factorRow(int y, int chunk, int x) const {
+        return ((size_t(y) * chunks + chunk) * size[0] + x) * WAVE_LANES;
+    }
+    /** Signed wave index of a place along axis d. */
+    int waveIndex(int d, int i) const { return 2 * i <= size[d] ? i : i - size[d]; }
     GridParticles<Real> particles() const;
     void spread(const Real* forces);
     void scale(bool forced, Real noise, const numerics::NoiseKey& key);
+    void scaleLine(int y, int thread, WaveColumns<Real> columns);
     void gather(Real* u);
 
     numerics::Lattice box;
     double a;
     const Threads& threads;
-    const SimdKernels<Real>& simd = simdKernels<Real>();
+    GridKernels<Real> gridLoops = gridKernels<Real>();
+    WaveKernels<Real> waveLoops = waveKernels<Real>();
     int support, padded, size[3], windowDegree;
-    size_t rowLength, blockLength;
+    int chunks; ///< groups of WAVE_LANES modes along z
+    size_t rowLength, planeLength;
     std::vector<Real> windowCoefficients;
     std::unique_ptr<GridFft<Real>> fft;
-    FftArray<Real> grids[3]; ///< [x][y][rowLength], real or complex
-    FftArray<Real> factors;  ///< [y][x][blockLength]
-    /// per thread: three columns and the noise of one row
-    std::vector<std::unique_ptr<FftArray<Real>>> blocks;
-    std::vector<int> order, columnOf, columnStart, first, sortedFirst;
+    FftArray<Real> grids[3];     ///< [x][y][z], real or complex
+    FftArray<Real> factors;      ///< [y][chunk][x][WAVE_LANES]
+    std::vector<int> keptChunks; ///< per y: beyond, no mode is kept
+    /// per thread: four planes, or three blocks of columns
+    std::vector<std::unique_ptr<FftArray<Real>>> scratch;
+    std::vector<int> order, columnOf, columnStart, first;
     std::vector<Real> offsets, weights, sortedForces, sortedVelocities;
 };
 

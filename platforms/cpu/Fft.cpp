@@ -33,25 +33,29 @@ template <class Real> void FftArray<Real>::resize(size_t size) {
         throw std::bad_alloc();
 }
 
-template <class Real>
-GridFft<Real>::GridFft(int nx, int ny, int nz, size_t rowLength, size_t blockLength) {
+template <class Real> GridFft<Real>::GridFft(const Layout& layout) {
     using Library = FftLibrary<Real>;
-    const int planeSize[2] = {ny, nz}, realRows[2] = {ny, int(rowLength)},
-              complexRows[2] = {ny, int(rowLength / 2)};
-    const int waves = nz / 2 + 1, stride = ny * int(rowLength / 2);
-    FftArray<Real> grid(size_t(nx) * ny * rowLength), block(2 * nx * blockLength);
+    const int nx = layout.size[0], ny = layout.size[1], nz = layout.size[2], waves = nz / 2 + 1;
+    const int row = int(layout.rowLength), line = row / 2, plane = int(layout.planeLength / 2),
+              width = layout.blockWidth;
+    FftArray<Real> grid(nx * layout.planeLength), other(layout.planeLength), block(2 * nx * width);
+    Real *const r = grid.begin(), *const s = other.begin();
+    auto *const c = raw<Real>(r), *const t = raw<Real>(s), *const b = raw<Real>(block.begin());
+    const auto lines = [&](auto* in, auto* out, int sign) {
+        return Library::planComplex(1, &ny, waves, in, NULL, line, 1, out, NULL, line, 1, sign,
+                                    FFTW_ESTIMATE);
+    };
     std::lock_guard<std::mutex> guard(plannerLock());
-    forwardPlane = Library::planReal(2, planeSize, 1, grid.begin(), realRows, 1, 0,
-                                     raw<Real>(grid.begin()), complexRows, 1, 0, FFTW_ESTIMATE);
-    backwardPlane = Library::planInverseReal(2, planeSize, 1, raw<Real>(grid.begin()), complexRows,
-                                             1, 0, grid.begin(), realRows, 1, 0, FFTW_ESTIMATE);
-    forwardColumn = Library::planComplex(1, &nx, waves, raw<Real>(grid.begin()), NULL, stride, 1,
-                                         raw<Real>(block.begin()), NULL, int(blockLength), 1,
+    rowForward = Library::planReal(1, &nz, ny, r, NULL, 1, row, t, NULL, 1, line, FFTW_ESTIMATE);
+    rowBackward =
+        Library::planInverseReal(1, &nz, ny, t, NULL, 1, line, r, NULL, 1, row, FFTW_ESTIMATE);
+    lineForward = lines(t, c, FFTW_FORWARD);
+    lineBackward = lines(c, t, FFTW_BACKWARD);
+    forwardColumn = Library::planComplex(1, &nx, width, c, NULL, plane, 1, b, NULL, width, 1,
                                          FFTW_FORWARD, FFTW_ESTIMATE);
-    backwardColumn = Library::planComplex(1, &nx, waves, raw<Real>(block.begin()), NULL,
-                                          int(blockLength), 1, raw<Real>(grid.begin()), NULL,
-                                          stride, 1, FFTW_BACKWARD, FFTW_ESTIMATE);
-    for (auto plan : {forwardPlane, backwardPlane, forwardColumn, backwardColumn})
+    backwardColumn = Library::planComplex(1, &nx, width, b, NULL, width, 1, c, NULL, plane, 1,
+                                          FFTW_BACKWARD, FFTW_ESTIMATE);
+    for (Plan plan : all())
         if (plan == NULL)
             throw std::runtime_error("the FFT library has no plan for a grid of " +
                                      std::to_string(nx) + " x " + std::to_string(ny) + " x " +
@@ -60,16 +64,19 @@ GridFft<Real>::GridFft(int nx, int ny, int nz, size_t rowLength, size_t blockLen
 
 template <class Real> GridFft<Real>::~GridFft() {
     std::lock_guard<std::mutex> guard(plannerLock());
-    for (auto plan : {forwardPlane, backwardPlane, forwardColumn, backwardColumn})
+    for (Plan plan : all())
         FftLibrary<Real>::destroy(plan);
 }
 
-template <class Real> void GridFft<Real>::planeForward(Real* plane) const {
-    FftLibrary<Real>::executeReal(forwardPlane, plane, raw<Real>(plane));
+template <class Real>
+void GridFft<Real>::planeForward(Real* plane, Real* scratch, Real* waves) const {
+    FftLibrary<Real>::executeReal(rowForward, plane, raw<Real>(scratch));
+    FftLibrary<Real>::executeComplex(lineForward, raw<Real>(scratch), raw<Real>(waves));
 }
 
-template <class Real> void GridFft<Real>::planeBackward(Real* plane) const {
-    FftLibrary<Real>::executeInverseReal(backwardPlane, raw<Real>(plane), plane);
+template <class Real> void GridFft<Real>::planeBackward(Real* plane, Real* scratch) const {
+    FftLibrary<Real>::executeComplex(lineBackward, raw<Real>(plane), raw<Real>(scratch));
+    FftLibrary<Real>::executeInverseReal(rowBackward, raw<Real>(scratch), plane);
 }
 
 template <class Real> void GridFft<Real>::columnForward(Real* column, Complex* block) const {

@@ -6,6 +6,7 @@
 // too). Plans are serial and made by estimate, never by timing: the same plan on every run and for
 // any number of threads, so the same bits.
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <fftw3.h>
@@ -62,28 +63,40 @@ private:
 
 /**
  * The transforms of a real grid [x][y][z] in two stages that threads can share: planes (y, z)
- * between real and complex, in place, and columns along x, from the grid into a block [x][z] of the
- * caller and back. Unnormalised; forward has exp(-i k x).
+ * between real and complex, and columns along x, a few at a time, from the grid into a block [x][z]
+ * of the caller and back. Unnormalised; forward has exp(-i k x).
+ *
+ * Every pass goes from one array to another: in place, plans made by estimate are two to four times
+ * slower than those made by measurement, out of place they are not (benchmarks/).
  */
 template <class Real> class GridFft {
 public:
     using Complex = std::complex<Real>;
-    /**
-     * @param rowLength     reals from one row of the grid to the next, even, >= 2 (nz/2 + 1)
-     * @param blockLength   complex numbers from one row of a block to the next, >= nz/2 + 1
-     */
-    GridFft(int nx, int ny, int nz, size_t rowLength, size_t blockLength);
+    /** Distances between rows [z], planes [y][z] of the grid in reals (even), and block width. */
+    struct Layout {
+        int size[3];
+        size_t rowLength;   ///< from one row to the next, >= 2 (nz/2 + 1)
+        size_t planeLength; ///< from one plane to the next
+        int blockWidth;     ///< columns in one block
+    };
+    explicit GridFft(const Layout& layout);
     ~GridFft();
     GridFft(const GridFft&) = delete;
     GridFft& operator=(const GridFft&) = delete;
-    void planeForward(Real* plane) const;
-    void planeBackward(Real* plane) const;
-    /** @param column  the grid at (x = 0, y, z = 0) */
+    /** From real `plane` to complex `waves`; `scratch`, a plane too, is overwritten. */
+    void planeForward(Real* plane, Real* scratch, Real* waves) const;
+    /** From complex to real in place; `scratch` is overwritten. */
+    void planeBackward(Real* plane, Real* scratch) const;
+    /** @param column  the grid at (x = 0, y, z) */
     void columnForward(Real* column, Complex* block) const;
     void columnBackward(Complex* block, Real* column) const;
 
 private:
-    typename FftLibrary<Real>::Plan forwardPlane, backwardPlane, forwardColumn, backwardColumn;
+    using Plan = typename FftLibrary<Real>::Plan;
+    Plan rowForward, rowBackward, lineForward, lineBackward, forwardColumn, backwardColumn;
+    std::array<Plan, 6> all() const {
+        return {rowForward, rowBackward, lineForward, lineBackward, forwardColumn, backwardColumn};
+    }
 };
 
 } // namespace PSE

@@ -46,11 +46,11 @@ public:
 
     /** Call work(from, to, block) for blocks of a fixed size that cover [0, n). */
     template <class Work> void runBlocks(int n, Work work) const {
-        run(blocks(n), [&](int block, int) {
-            work(block * BLOCK, n < (block + 1) * BLOCK ? n : (block + 1) * BLOCK, block);
-        });
+        run(blocks(n), [&](int block, int) { work(from(block), to(block, n), block); });
     }
     static int blocks(int n) { return (n + BLOCK - 1) / BLOCK; }
+    static int from(int block) { return block * BLOCK; }
+    static int to(int block, int n) { return n < (block + 1) * BLOCK ? n : (block + 1) * BLOCK; }
 
 private:
     static constexpr int BLOCK = 256;

@@ -22,20 +22,27 @@ public:
             vectors.emplace_back(engine.positions.size());
         return vectors[i];
     }
-    void multiply(const Vector& v, Vector& out) const { engine.multiplyReal(v, out); }
+    double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const {
+        engine.multiplyReal(v, out);
+        for (size_t i = 0; i < v.size(); i++)
+            out[i] = s * out[i] + t * w[i];
+        return dot(v, out);
+    }
     double dot(const Vector& v, const Vector& w) const {
         double sum = 0;
         for (size_t i = 0; i < v.size(); i++)
             sum += v[i].dot(w[i]);
         return sum;
     }
-    void scaledCopy(double s, const Vector& v, Vector& out) const {
-        for (size_t i = 0; i < v.size(); i++)
-            out[i] = s * v[i];
-    }
-    void addScaled(double s, const Vector& v, Vector& out) const {
+    double addScaled(double s, const Vector& v, Vector& out) const {
         for (size_t i = 0; i < v.size(); i++)
             out[i] += s * v[i];
+        return dot(out, out);
+    }
+    void combine(const std::vector<double>& coefficients, Vector& out) const {
+        out.assign(engine.positions.size(), Vec3::Zero());
+        for (size_t k = 0; k < coefficients.size(); k++)
+            addScaled(coefficients[k], vectors[k], out);
     }
 
 private:
@@ -165,12 +172,12 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
             u[i] += selfMobility * part[i];
     }
     if (thermal != NULL) {
-        Vectors z(u.size());
+        LanczosSpace space(*this);
+        Vectors& z = space.basis(0);
         for (size_t i = 0; i < u.size(); i++)
             particleNoise(thermal->real, indices[i], z[i].data());
-        LanczosSpace space(*this);
         // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-        iterations = lanczosSquareRoot(space, z, part, LANCZOS_TOLERANCE,
+        iterations = lanczosSquareRoot(space, part, LANCZOS_TOLERANCE,
                                        std::max(2 * plan.predictedError, 1e-10), true);
         const double scale = std::sqrt(2 * thermal->kT * selfMobility / thermal->dt);
         for (size_t i = 0; i < u.size(); i++)

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: MIT
+#include "PairKernels.h"
+#include "numerics/Rpy.h"
+#include <type_traits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "PairKernels.cpp"
+#include <hwy/foreach_target.h> // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace PSE {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/** Horner's rule, coefficients with the highest power first. */
+template <class D>
+HWY_INLINE hn::Vec<D> polynomial(D d, const hn::TFromD<D>* coefficients, int degree, hn::Vec<D> t) {
+    auto sum = hn::Set(d, coefficients[0]);
+    for (int power = 1; power <= degree; power++)
+        sum = hn::MulAdd(sum, t, hn::Set(d, coefficients[power]));
+    return sum;
+}
+
+/** F and C of one block from its displacements; lanes from `used` on count for nothing. */
+template <class Real>
+HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, PairBlock<Real>& p) {
+    using Rpy = numerics::RpyCoefficients;
+    const hn::CappedTag<Real, PAIR_LANES> d;
+    const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
+    const auto one = constant(1), zero = hn::Zero(d);
+    for (int k = 0; k < PAIR_LANES; k += static_cast<int>(hn::Lanes(d))) {
+        const auto dx = hn::LoadU(d, p.dx + k), dy = hn::LoadU(d, p.dy + k),
+                   dz = hn::LoadU(d, p.dz + k);
+        const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+        const auto t = hn::MulSub(constant(2 / (double(table.rc) * table.rc)), r2, one);
+        const auto waveF = polynomial(d, table.F, table.degreeF, t),
+                   waveC = polynomial(d, table.C, table.degreeC, t);
+        const auto r = hn::Sqrt(r2), s = hn::Div(one, r), s2 = hn::Mul(s, s);
+        // Both regimes, then a choice. At r = 0 the one that is not chosen is infinite.
+        const auto overlap = hn::Lt(r, constant(Rpy::CONTACT));
+        const auto F = hn::IfThenElse(
+            overlap, hn::MulAdd(constant(Rpy::OVERLAP_F1), r, one),
+            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_F3), s2, constant(Rpy::APART_F1))));
+        const auto G = hn::IfThenElse(
+            overlap, hn::MulAdd(constant(Rpy::OVERLAP_G1), r, one),
+            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_G3), s2, constant(Rpy::APART_G1))));
+        const auto C = hn::IfThenElse(hn::Gt(r2, zero), hn::Mul(hn::Sub(G, F), s2), zero);
+        const int left = used - k; // in these lanes
+        const auto inUse = hn::FirstN(d, left > 0 ? size_t(left) : 0);
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(F, waveF)), d, p.F + k);
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(C, waveC)), d, p.C + k);
+    }
+}
+
+template <class Real>
+void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last,
+                       PairBlock<Real>* blocks) {
+    for (int b = 0; b < count; b++)
+        evaluateBlock(table, b == count - 1 ? last : PAIR_LANES, blocks[b]);
+}
+
+/** Coordinates of particles that follow each other, as PairCoordinate has them. */
+template <class D> HWY_INLINE auto loadCoordinates(D, const int32_t* HWY_RESTRICT x) {
+    return hn::LoadU(hn::RebindToSigned<D>(), x);
+}
+template <class D> HWY_INLINE auto loadCoordinates(D d, const double* HWY_RESTRICT x) {
+    return hn::LoadU(d, x);
+}
+
+/** Displacements to the nearest images of other particles, in radii. */
+template <class D> class Displacement {
+public:
+    using Real = hn::TFromD<D>;
+    using V = hn::Vec<D>;
+    HWY_INLINE Displacement(D d, const PairGeometry<Real>& g, int i) : d(d), g(g), i(i) {}
+
+    template <class Coordinate>
+    HWY_INLINE void of(Coordinate x, Coordinate y, Coordinate z, V& dx, V& dy, V& dz) const {
+        const V sx = difference(g.x[i], x), sy = difference(g.y[i], y), sz = difference(g.z[i], z);
+        dx = hn::MulAdd(constant(g.box[0]), sx,
+                        hn::MulAdd(constant(g.box[1]), sy, hn::Mul(constant(g.box[3]), sz)));
+        dy = hn::MulAdd(constant(g.box[2]), sy, hn::Mul(constant(g.box[4]), sz));
+        dz = hn::Mul(constant(g.box[5]), sz);
+        if (g.tilted) { // the nearest fractions are not always the nearest image there
+            const V nb = hn::Round(hn::Mul(dy, constant(1 / g.whole[2])));
+            dy = hn::NegMulAdd(nb, constant(g.whole[2]), dy);
+            dx = hn::NegMulAdd(nb, constant(g.whole[1]), dx);
+            const V na = hn::Round(hn::Mul(dx, constant(1 / g.whole[0])));
+            dx = hn::NegMulAdd(na, constant(g.whole[0]), dx);
+        }
+    }
+
+private:
+    HWY_INLINE V constant(Real value) const { return hn::Set(d, value); }
+    /** In units of PairCoordinate; integers wrap around by themselves. */
+    template <class Integers> HWY_INLINE V difference(int32_t own, Integers other) const {
+        const hn::RebindToSigned<D> di;
+        return hn::ConvertTo(d, hn::Sub(hn::Set(di, own), other));
+    }
+    HWY_INLINE V difference(double own, V other) const {
+        const V s = hn::Sub(hn::Set(d, own), other);
+        return hn::Sub(s, hn::Round(s));
+    }
+
+    D d;
+    const PairGeometry<Real>& g;
+    int i;
+};
+
+/** Indices in numbers as wide as a Real: integers, or reals where those have 53 bits. */
+template <class D>
+using IndexTag = std::conditional_t<sizeof(hn::TFromD<D>) == 4, hn::RebindToSigned<D>, D>;
+
+template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int32_t* to) {
+    if constexpr (sizeof(hn::TFromD<DI>) == 4)
+        hn::StoreU(indices, d, to);
+    else {
+        const hn::Rebind<int32_t, DI> narrow;
+        hn::StoreU(hn::DemoteTo(narrow, indices), narrow, to);
+    }
+}
+
+/**
+ * Collect the neighbours of particle i among the candidates, without a branch for each of them.
+ * @return how many there are
+ */
+template <class Real>
+HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, const PairRun* runs, int numRuns,
+                              int32_t* HWY_RESTRICT found) {
+    const hn::CappedTag<Real, PAIR_LANES> d;
+    const IndexTag<decltype(d)> di;
+    using Index = hn::TFromD<decltype(di)>;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const Displacement<decltype(d)> displacement(d, g, i);
+    const auto range2 = hn::Set(d, g.range * g.range);
+    const auto self = hn::Set(di, Index(i));
+    size_t n = 0;
+    for (int r = 0; r < numRuns; r++)
+        for (int j = runs[r].begin; j < runs[r].end; j += lanes) {
+            hn::Vec<decltype(d)> dx, dy, dz;
+            displacement.of(loadCoordinates(d, g.x + j), loadCoordinates(d, g.y + j),
+                            loadCoordinates(d, g.z + j), dx, dy, dz);
+            const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+            const auto index = hn::Iota(di, Index(j));
+            const auto candidate =
+                hn::And(hn::Lt(index, hn::Set(di, Index(runs[r].end))), hn::Ne(index, self));
+            const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2)), candidate);
+            storeIndices(di, hn::Compress(index, in), found + n);
+            n += hn::CountTrue(di, in);
+        }
+    return static_cast<int>(n);
+}
+
+template <class Real>
+int fillRowAny(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
+               const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
+    const hn::CappedTag<Real, PAIR_LANES> d;
+    const Displacement<decltype(d)> displacement(d, geometry, i);
+    const int n = findNeighbours(geometry, i, runs, numRuns, found);
+    for (int k = n; k < n + PAIR_LANES; k++) // lanes of the last block that no neighbour fills
+        found[k] = i;
+    const int blocks = (n + PAIR_LANES - 1) / PAIR_LANES;
+    for (int b = 0; b < blocks; b++) {
+        PairBlock<Real>& block = row[b];
+        const int begin = b * PAIR_LANES;
+        typename PairCoordinate<Real>::Type x[PAIR_LANES], y[PAIR_LANES], z[PAIR_LANES];
+        for (int k = 0; k < PAIR_LANES; k++) {
+            const int j = found[begin + k];
+            block.offset[k] = 3 * j;
+            x[k] = geometry.x[j];
+            y[k] = geometry.y[j];
+            z[k] = geometry.z[j];
+        }
+        for (size_t k = 0; k < PAIR_LANES; k += hn::Lanes(d)) {
+            hn::Vec<decltype(d)> dx, dy, dz;
+            displacement.of(loadCoordinates(d, x + k), loadCoordinates(d, y + k),
+                            loadCoordinates(d, z + k), dx, dy, dz);
+            hn::StoreU(dx, d, block.dx + k);
+            hn::StoreU(dy, d, block.dy + k);
+            hn::StoreU(dz, d, block.dz + k);
+        }
+        evaluateBlock(table, n - begin < PAIR_LANES ? n - begin : PAIR_LANES, block);
+    }
+    return blocks;
+}
+
+/** Sum of v w, accumulated in double. */
+template <class Real> double dotAny(int n, const Real* HWY_RESTRICT v, const Real* HWY_RESTRICT w) {
+    const hn::ScalableTag<double> dd;
+    const hn::Rebind<Real, decltype(dd)> d;
+    const int lanes = static_cast<int>(hn::Lanes(dd));
+    auto sum0 = hn::Zero(dd), sum1 = hn::Zero(dd);
+    const auto load = [&](const Real* p) {
+        if constexpr (sizeof(Real) == 4)
+            return hn::PromoteTo(dd, hn::LoadU(d, p));
+        else
+            return hn::LoadU(dd, p);
+    };
+    int i = 0;
+    for (; i + 2 * lanes <= n; i += 2 * lanes) {
+        sum0 = hn::MulAdd(load(v + i), load(w + i), sum0);
+        sum1 = hn::MulAdd(load(v + i + lanes), load(w + i + lanes), sum1);
+    }
+    double total = hn::GetLane(hn::SumOfLanes(dd, hn::Add(sum0, sum1)));
+    for (; i < n; i++)
+        total += double(v[i]) * double(w[i]);
+    return total;
+}
+
+template <class Real>
+double addScaledAny(int n, Real s, const Real* HWY_RESTRICT v, Real* HWY_RESTRICT out) {
+    for (int i = 0; i < n; i++)
+        out[i] += s * v[i];
+    return dotAny(n, out, out);
+}
+
+#if HWY_TARGET == HWY_SCALAR
+/** Three numbers of one neighbour. */
+template <class D, class Real = hn::TFromD<D>>
+HWY_INLINE void loadNeighbours(D d, const Real* HWY_RESTRICT v, const int32_t* HWY_RESTRICT offsets,
+                               hn::Vec<D>& x, hn::Vec<D>& y, hn::Vec<D>& z) {
+    x = hn::Set(d, v[*offsets]);
+    y = hn::Set(d, v[*offsets + 1]);
+    z = hn::Set(d, v[*offsets + 2]);
+}
+#else
+/** A vector of one or two blocks of 128 bits, each from an address of its own. */
+template <class D, class Real = hn::TFromD<D>>
+HWY_INLINE hn::Vec<D> loadBlocks(D d, const Real* low, const Real* high) {
+    if constexpr (hn::MaxLanes(D()) * sizeof(Real) == 16) {
+        (void)high;
+        return hn::LoadU(d, low);
+    } else {
+        const hn::Half<D> half;
+        return hn::Combine(d, hn::LoadU(half, high), hn::LoadU(half, low));
+    }
+}
+
+/**
+ * Three numbers of each neighbour, one vector per component: by loads of whole blocks and
+ * transposition, which beats gather instructions. One number beyond the last is read.
+ */
+template <class D>
+HWY_INLINE void loadNeighbours(D d, const float* HWY_RESTRICT v,
+                               const int32_t* HWY_RESTRICT offsets, hn::Vec<D>& x, hn::Vec<D>& y,
+                               hn::Vec<D>& z) {
+    const hn::Repartition<uint64_t, D> pairs;
+    const int high = (hn::MaxLanes(D()) == 4 ? 0 : 4);
+    const auto block = [&](int k) { return loadBlocks(d, v + offsets[k], v + offsets[high + k]); };
+    const auto v0 = block(0), v1 = block(1), v2 = block(2), v3 = block(3);
+    const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, v0, v1)),
+               low23 = hn::BitCast(pairs, hn::InterleaveLower(d, v2, v3)),
+               high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, v0, v1)),
+               high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, v2, v3));
+    x = hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23));
+    y = hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23));
+    z = hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23));
+}
+template <class D>
+HWY_INLINE void loadNeighbours(D d, const double* HWY_RESTRICT v,
+                               const int32_t* HWY_RESTRICT offsets, hn::Vec<D>& x, hn::Vec<D>& y,
+                               hn::Vec<D>& z) {
+    const int high = (hn::MaxLanes(D()) == 2 ? 0 : 2);
+    const auto block = [&](int k, int c) {
+        return loadBlocks(d, v + offsets[k] + c, v + offsets[high + k] + c);
+    };
+    const auto xy0 = block(0, 0), xy1 = block(1, 0), z0 = block(0, 2), z1 = block(1, 2);
+    x = hn::InterleaveLower(d, xy0, xy1);
+    y = hn::InterleaveUpper(d, xy0, xy1);
+    z = hn::InterleaveLower(d, z0, z1);
+}
+#endif
+
+template <class Real>
+double multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real* HWY_RESTRICT v,
+                       Real s, const Real* HWY_RESTRICT w, Real t, Real* HWY_RESTRICT out) {
+    const hn::CappedTag<Real, 32 / sizeof(Real)> d; // two blocks of 128 bits at most
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int i = from; i < to; i++) {
+        auto x = hn::Zero(d), y = hn::Zero(d), z = hn::Zero(d);
+        const PairBlock<Real>* block = rows.blocks + rows.start[i];
+        for (int b = 0; b < rows.count[i]; b++, block++)
+            for (int k = 0; k < PAIR_LANES; k += lanes) {
+                hn::Vec<decltype(d)> vx, vy, vz;
+                loadNeighbours(d, v, block->offset + k, vx, vy, vz);
+                const auto dx = hn::LoadU(d, block->dx + k), dy = hn::LoadU(d, block->dy + k),
+                           dz = hn::LoadU(d, block->dz + k), F = hn::LoadU(d, block->F + k);
+                const auto along = hn::Mul(hn::LoadU(d, block->C + k),
+                                           hn::MulAdd(dx, vx, hn::MulAdd(dy, vy, hn::Mul(dz, vz))));
+                x = hn::MulAdd(along, dx, hn::MulAdd(F, vx, x));
+                y = hn::MulAdd(along, dy, hn::MulAdd(F, vy, y));
+                z = hn::MulAdd(along, dz, hn::MulAdd(F, vz, z));
+            }
+        const size_t own = 3 * size_t(i);
+        const Real sum[3] = {hn::GetLane(hn::SumOfLanes(d, x)), hn::GetLane(hn::SumOfLanes(d, y)),
+                             hn::GetLane(hn::SumOfLanes(d, z))};
+        for (int c = 0; c < 3; c++)
+            out[own + c] = s * (rows.self * v[own + c] + sum[c]) + t * w[own + c];
+    }
+    return dotAny(3 * (to - from), v + 3 * size_t(from), out + 3 * size_t(from));
+}
+
+template <class Real> PairKernels<Real> allPairKernels() {
+    return {fillRowAny<Real>, evaluateBlocksAny<Real>, multiplyRowsAny<Real>, addScaledAny<Real>,
+            dotAny<Real>};
+}
+
+// Dispatch tables hold functions, not templates: one name per precision.
+PairKernels<float> singlePairKernels() {
+    return allPairKernels<float>();
+}
+PairKernels<double> doublePairKernels() {
+    return allPairKernels<double>();
+}
+
+} // namespace HWY_NAMESPACE
+} // namespace PSE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace PSE {
+
+HWY_EXPORT(singlePairKernels);
+HWY_EXPORT(doublePairKernels);
+
+template <> PairKernels<float> pairKernels<float>() {
+    return HWY_DYNAMIC_DISPATCH(singlePairKernels)();
+}
+template <> PairKernels<double> pairKernels<double>() {
+    return HWY_DYNAMIC_DISPATCH(doublePairKernels)();
+}
+
+} // namespace PSE
+#endif

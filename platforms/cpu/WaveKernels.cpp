@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+#include "WaveKernels.h"
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "WaveKernels.cpp"
+#include <hwy/foreach_target.h> // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+#include <hwy/contrib/math/math-inl.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace PSE {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int LANES = WAVE_LANES;
+
+/** The first two words of the counter block for LANES indices of 64 bits. */
+struct NoiseIndices {
+    uint32_t low[LANES], high[LANES];
+};
+
+/** philox() of Noise.h for LANES indices: four rows of words. */
+HWY_INLINE void philoxRow(const numerics::NoiseKey& key, uint32_t part, const NoiseIndices& index,
+                          uint32_t words[4][LANES]) {
+    const uint32_t step = uint32_t(key.counter),
+                   last = (uint32_t(key.counter >> 32) & 0xFFFFu) | (part << 16);
+    for (int i = 0; i < LANES; i++) {
+        uint32_t c0 = index.low[i], c1 = index.high[i], c2 = step, c3 = last;
+        uint32_t k0 = key.seed, k1 = uint32_t(key.stream);
+#pragma GCC unroll 10
+        for (int round = 0; round < 10; round++) {
+            const uint64_t p0 = uint64_t(0xD2511F53u) * c0, p1 = uint64_t(0xCD9E8D57u) * c2;
+            c0 = uint32_t(p1 >> 32) ^ c1 ^ k0;
+            c1 = uint32_t(p1);
+            c2 = uint32_t(p0 >> 32) ^ c3 ^ k1;
+            c3 = uint32_t(p0);
+            k0 += 0x9E3779B9u;
+            k1 += 0xBB67AE85u;
+        }
+        words[0][i] = c0;
+        words[1][i] = c1;
+        words[2][i] = c2;
+        words[3][i] = c3;
+    }
+}
+
+/** boxMuller() of Noise.h for LANES pairs of words; each number times `scale`. */
+template <class Real>
+HWY_INLINE void boxMullerRow(const uint32_t* HWY_RESTRICT first,
+                             const uint32_t* HWY_RESTRICT second, Real scale, Real* HWY_RESTRICT z0,
+                             Real* HWY_RESTRICT z1) {
+    const hn::CappedTag<Real, LANES> d;
+    for (int i = 0; i < LANES; i++) {
+        z0[i] = (Real(first[i]) + Real(0.5)) * Real(1.0 / 4294967296.0);
+        z1[i] = Real(int32_t(second[i])) * Real(M_PI / 2147483648.0);
+    }
+    for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
+        const auto logarithm = hn::Min(hn::Log(d, hn::LoadU(d, z0 + i)), hn::Zero(d));
+        const auto radius =
+            hn::Mul(hn::Set(d, scale), hn::Sqrt(hn::Mul(hn::Set(d, Real(-2)), logarithm)));
+        const auto angle = hn::LoadU(d, z1 + i);
+        hn::StoreU(hn::Mul(radius, hn::Cos(d, angle)), d, z0 + i);
+        hn::StoreU(hn::Mul(radius, hn::Sin(d, angle)), d, z1 + i);
+    }
+}
+
+/** modeNoise() of Noise.h for one row of modes: real and imaginary part of each component. */
+template <class Real>
+HWY_INLINE void fillModeNoise(const WaveColumns<Real>& columns, int nx, Real noise[6][LANES]) {
+    NoiseIndices index;
+    // The indices of a row differ in n3 alone, which takes the bits from 42 on.
+    const uint64_t base = numerics::modeIndex(nx, columns.ny, columns.firstZ + 1);
+    for (int i = 0; i < LANES; i++) {
+        index.low[i] = uint32_t(base);
+        index.high[i] = uint32_t(base >> 32) + (uint32_t(i - 1) << 10);
+    }
+    uint32_t words[8][LANES];
+    philoxRow(columns.key, 0, index, words);
+    philoxRow(columns.key, 1, index, words + 4);
+    for (int c = 0; c < 3; c++)
+        boxMullerRow(words[2 * c], words[2 * c + 1], Real(M_SQRT1_2), noise[2 * c],
+                     noise[2 * c + 1]);
+    if (columns.firstZ == 0) {
+        // In the plane n3 = 0, n and -n are both stored and must be conjugate: the shared routine
+        // takes care of it.
+        std::complex<Real> z[3];
+        numerics::modeNoise(columns.key, nx, columns.ny, 0, z);
+        for (int c = 0; c < 3; c++) {
+            noise[2 * c][0] = z[c].real();
+            noise[2 * c + 1][0] = z[c].imag();
+        }
+    }
+}
+
+/** One row of LANES modes; see WaveKernels::scaleColumns. */
+template <class Real>
+HWY_INLINE void scaleRow(const WaveColumns<Real>& columns, int nx, const Real* HWY_RESTRICT factors,
+                         const Real noise[6][LANES], Real* const rows[3]) {
+    const hn::CappedTag<Real, LANES> d;
+    const Real* b = columns.waveVectors;
+    const auto zero = hn::Zero(d), force = hn::Set(d, Real(columns.forced ? 1 : 0));
+    for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
+        const auto D = hn::LoadU(d, factors + i);
+        const auto nz = hn::Iota(d, Real(columns.firstZ + int(i)));
+        hn::Vec<decltype(d)> k[3], re[3], im[3];
+        for (int c = 0; c < 3; c++)
+            k[c] = hn::MulAdd(hn::Set(d, b[3 * c + 2]), nz,
+                              hn::Set(d, b[3 * c] * nx + b[3 * c + 1] * columns.ny));
+        const auto k2 = hn::MulAdd(k[0], k[0], hn::MulAdd(k[1], k[1], hn::Mul(k[2], k[2])));
+        const auto weight = hn::Mul(force, D),
+                   amplitude = hn::Mul(hn::Set(d, columns.noise), hn::Sqrt(D));
+        auto alongRe = zero, alongIm = zero;
+        for (int c = 0; c < 3; c++) {
+            re[c] = im[c] = zero;
+            if (columns.forced) {
+                hn::LoadInterleaved2(d, rows[c] + 2 * i, re[c], im[c]);
+                re[c] = hn::Mul(weight, re[c]);
+                im[c] = hn::Mul(weight, im[c]);
+            }
+            if (columns.noise != 0) {
+                re[c] = hn::MulAdd(amplitude, hn::LoadU(d, noise[2 * c] + i), re[c]);
+                im[c] = hn::MulAdd(amplitude, hn::LoadU(d, noise[2 * c + 1] + i), im[c]);
+            }
+            alongRe = hn::MulAdd(k[c], re[c], alongRe);
+            alongIm = hn::MulAdd(k[c], im[c], alongIm);
+        }
+        const auto kept = hn::Gt(D, zero);
+        const auto inverse = hn::Div(hn::Set(d, Real(1)), k2);
+        alongRe = hn::Mul(alongRe, inverse);
+        alongIm = hn::Mul(alongIm, inverse);
+        for (int c = 0; c < 3; c++) {
+            // a choice, not a product: where nothing is kept, k may be zero and contents arbitrary
+            re[c] = hn::IfThenElseZero(kept, hn::NegMulAdd(alongRe, k[c], re[c]));
+            im[c] = hn::IfThenElseZero(kept, hn::NegMulAdd(alongIm, k[c], im[c]));
+            hn::StoreInterleaved2(re[c], im[c], d, rows[c] + 2 * i);
+        }
+    }
+}
+
+template <class Real> HWY_INLINE bool anyKept(const Real* factors) {
+    Real sum = 0; // none is negative
+    for (int i = 0; i < LANES; i++)
+        sum += factors[i];
+    return sum > 0;
+}
+
+template <class Real>
+void scaleColumnsAny(const WaveColumns<Real>& columns, std::complex<Real>* const blocks[3]) {
+    Real noise[6][LANES];
+    for (int x = 0; x < columns.sizeX; x++) {
+        const Real* factors = columns.factors + size_t(x) * LANES;
+        Real* rows[3];
+        for (int c = 0; c < 3; c++)
+            rows[c] = reinterpret_cast<Real*>(blocks[c] + size_t(x) * LANES);
+        if (!anyKept(factors)) {
+            for (Real* row : rows)
+                for (int i = 0; i < 2 * LANES; i++)
+                    row[i] = 0;
+            continue;
+        }
+        const int nx = (2 * x <= columns.sizeX ? x : x - columns.sizeX);
+        if (columns.noise != 0)
+            fillModeNoise(columns, nx, noise);
+        scaleRow(columns, nx, factors, noise, rows);
+    }
+}
+
+template <class Real>
+void particleNoiseAny(const numerics::NoiseKey& key, const uint32_t* HWY_RESTRICT particles, int n,
+                      Real* HWY_RESTRICT z) {
+    NoiseIndices index = {};
+    uint32_t words[4][LANES];
+    Real g[4][LANES];
+    for (int begin = 0; begin < n; begin += LANES) {
+        const int used = (n - begin < LANES ? n - begin : LANES);
+        for (int i = 0; i < used; i++)
+            index.low[i] = particles[begin + i];
+        philoxRow(key, 0, index, words);
+        boxMullerRow(words[0], words[1], Real(1), g[0], g[1]);
+        boxMullerRow(words[2], words[3], Real(1), g[2], g[3]);
+        for (int i = 0; i < used; i++)
+            for (int c = 0; c < 3; c++)
+                z[3 * size_t(begin + i) + c] = g[c][i];
+    }
+}
+
+// Dispatch tables hold functions, not templates: one name per precision.
+WaveKernels<float> singleWaveKernels() {
+    return {scaleColumnsAny<float>, particleNoiseAny<float>};
+}
+WaveKernels<double> doubleWaveKernels() {
+    return {scaleColumnsAny<double>, particleNoiseAny<double>};
+}
+
+} // namespace HWY_NAMESPACE
+} // namespace PSE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace PSE {
+
+HWY_EXPORT(singleWaveKernels);
+HWY_EXPORT(doubleWaveKernels);
+
+template <> WaveKernels<float> waveKernels<float>() {
+    return HWY_DYNAMIC_DISPATCH(singleWaveKernels)();
+}
+template <> WaveKernels<double> waveKernels<double>() {
+    return HWY_DYNAMIC_DISPATCH(doubleWaveKernels)();
+}
+
+} // namespace PSE
+#endif
