@@ -70,8 +70,6 @@ function(pse_plugin target folder)
     set_target_properties(${target} PROPERTIES
         CXX_VISIBILITY_PRESET default LINK_DEPENDS ${exports}
         LIBRARY_OUTPUT_DIRECTORY ${PSE_PLUGIN_OUTPUT_DIR} INSTALL_RPATH "$ORIGIN:$ORIGIN/..")
-    # Highway compiles a file once per instruction set by including it
-    target_include_directories(${target} PRIVATE ${folder})
     # The API library comes along even if no kernel calls it: it registers the XML proxy.
     target_link_options(${target} PRIVATE -Wl,--version-script=${exports} -Wl,--no-as-needed)
     target_link_libraries(${target} PRIVATE psehost ${ARGN})
@@ -118,6 +116,9 @@ function(pse_tests folder)
         pse_warnings(${name})
         target_link_libraries(${name} PRIVATE psenumerics GTest::gtest_main)
         set(environment "")
+        if(name STREQUAL "TestCpuEngine")
+            target_link_libraries(${name} PRIVATE psecpu)
+        endif()
         if(name STREQUAL "TestCppApi")
             target_link_libraries(${name} PRIVATE PSE)
             add_dependencies(${name} OpenMMPSEReference OpenMMPSECPU)

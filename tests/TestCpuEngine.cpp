@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+// The CPU engine on every instruction set that this machine has, and for any number of threads.
+#include "CpuEngine.h"
+#include "ParticleOrder.h"
+#include "numerics/Plan.h"
+#include "numerics/RealTable.h"
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+#include <memory>
+#include <random>
+
+using namespace PSE;
+using namespace PSE::numerics;
+
+namespace {
+
+const double TILTED_BOX[3][3] = {{20, 0, 0}, {9.5, 18, 0}, {-9, 8.5, 19}};
+
+struct EngineScene {
+    std::string name;
+    Lattice box;
+    std::vector<Vec3> positions, forces;
+    double tolerance;
+    Plan plan;
+};
+
+EngineScene makeScene(const std::string& name, const Lattice& box, int n, double tolerance) {
+    std::mt19937 random(n);
+    std::uniform_real_distribution<double> anywhere(-1, 2); // images of the box too
+    std::normal_distribution<double> normal;
+    EngineScene scene = {name, box, {}, {}, tolerance, {}};
+    for (int i = 0; i < n; i++) {
+        const double s[3] = {anywhere(random), anywhere(random), anywhere(random)};
+        scene.positions.push_back(box.cartesian(Vec3(s[0], s[1], s[2])));
+        const double f[3] = {normal(random), normal(random), normal(random)};
+        scene.forces.push_back(Vec3(f[0], f[1], f[2]));
+    }
+    if (n > 4) // two at one place, one on a corner of the box
+        scene.positions[1] = scene.positions[2], scene.positions[3] = Vec3::Zero();
+    PlanRequest request = {box, n, 1, tolerance, true, 1e-5, false, {}};
+    scene.plan = makePlan(request);
+    return scene;
+}
+
+std::vector<EngineScene> scenes() {
+    const auto column = [](int d) {
+        return Vec3(TILTED_BOX[d][0], TILTED_BOX[d][1], TILTED_BOX[d][2]);
+    };
+    const Lattice tilted(column(0), column(1), column(2));
+    std::vector<EngineScene> all;
+    for (double tolerance : {1e-3, 1e-6}) {
+        all.push_back(makeScene("cube", Lattice::orthorhombic(24, 24, 24), 200, tolerance));
+        all.push_back(makeScene("long box", Lattice::orthorhombic(12, 60, 15), 150, tolerance));
+        all.push_back(makeScene("tilted box", tilted, 150, tolerance));
+        all.push_back(makeScene("images", Lattice::orthorhombic(6, 6, 7), 9, tolerance));
+        all.push_back(makeScene("one particle", Lattice::orthorhombic(30, 30, 30), 1, tolerance));
+    }
+    return all;
+}
+
+std::vector<int> indicesOf(const EngineScene& scene) {
+    std::vector<int> indices;
+    for (size_t i = 0; i < scene.positions.size(); i++)
+        indices.push_back(static_cast<int>(3 * i + 1)); // not all particles of a System are mobile
+    return indices;
+}
+
+std::unique_ptr<MobilityEngine> makeEngine(const EngineScene& scene, OpenMM::ThreadPool& pool,
+                                           StageClock& clock, Precision precision) {
+    const std::vector<int> indices = indicesOf(scene);
+    if (precision == Precision::Single)
+        return std::make_unique<CpuEngine<float>>(scene.plan, scene.box, 1, indices, pool, clock);
+    return std::make_unique<CpuEngine<double>>(scene.plan, scene.box, 1, indices, pool, clock);
+}
+
+std::vector<Vec3> velocities(const EngineScene& scene, int threads, Precision precision,
+                             const std::vector<Vec3>* before = NULL) {
+    OpenMM::ThreadPool pool(threads);
+    StageClock clock;
+    const std::unique_ptr<MobilityEngine> engine = makeEngine(scene, pool, clock, precision);
+    const Thermal thermal = {
+        1, 0.01, {7, Stream::StepReal, 5000000000u}, {7, Stream::StepWave, 5000000000u}};
+    std::vector<Vec3> u;
+    if (before != NULL) {
+        engine->setPositions(*before);
+        engine->computeVelocities(&scene.forces, &thermal, u);
+    }
+    engine->setPositions(scene.positions);
+    engine->computeVelocities(&scene.forces, &thermal, u);
+    return u;
+}
+
+double norm(const std::vector<Vec3>& u) {
+    double sum = 0;
+    for (const Vec3& v : u)
+        sum += v.squaredNorm();
+    return std::sqrt(sum);
+}
+
+double distance(std::vector<Vec3> u, const std::vector<Vec3>& v) {
+    for (size_t i = 0; i < u.size(); i++)
+        u[i] -= v[i];
+    return norm(u);
+}
+
+/** Restores what Highway would have chosen by itself. */
+struct ChosenTarget {
+    explicit ChosenTarget(int64_t target) { choose(target); }
+    ~ChosenTarget() { choose(0); }
+    static void choose(int64_t target) {
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    }
+};
+
+/** The single targets among those that this machine can run. */
+std::vector<int64_t> runnableTargets() {
+    std::vector<int64_t> targets;
+    for (int64_t all = hwy::SupportedTargets(); all != 0; all &= all - 1)
+        targets.push_back(all & -all);
+    return targets;
+}
+
+/** M_R f by its definition [T5]: all pairs and images within range. */
+std::vector<Vec3> realVelocities(const EngineScene& scene) {
+    const RealTable table =
+        makeRealTable(*scene.plan.split, scene.plan.realCutoff, scene.plan.tableError);
+    std::vector<Vec3> u;
+    for (size_t i = 0; i < scene.positions.size(); i++) {
+        u.push_back(table.self * scene.forces[i]);
+        for (size_t j = 0; j < scene.positions.size(); j++)
+            for (const Vec3& image : scene.box.imagesWithin(scene.plan.realCutoff)) {
+                const Vec3 d = scene.box.wrapped(scene.positions[i]) -
+                               scene.box.wrapped(scene.positions[j]) + image;
+                if (d.norm() >= table.rc || (i == j && image == Vec3::Zero()))
+                    continue;
+                const SmoothScalars s = table(d.norm());
+                u[i] += s.F * scene.forces[j] + s.C * d.dot(scene.forces[j]) * d;
+            }
+    }
+    return u;
+}
+
+template <class Real>
+double realSpaceError(const EngineScene& scene, const std::vector<Vec3>& exact) {
+    OpenMM::ThreadPool pool(1);
+    const Threads threads(pool, true);
+    CpuRealSpace<Real> space(scene.plan, scene.box, threads);
+    std::vector<Vec3> fractions;
+    for (const Vec3& x : scene.positions)
+        fractions.push_back(scene.box.wrappedFractional(x));
+    space.setPositions(fractions);
+    const size_t n = fractions.size();
+    std::vector<Real> f(3 * n + 1), out(3 * n);
+    for (size_t place = 0; place < n; place++)
+        for (int c = 0; c < 3; c++)
+            f[3 * place + c] = Real(scene.forces[space.order()[place]][c]);
+    space.multiplyAdd(f, 1, f, 0, out);
+    std::vector<Vec3> u(n);
+    for (size_t place = 0; place < n; place++)
+        for (int c = 0; c < 3; c++)
+            u[space.order()[place]][c] = out[3 * place + c];
+    return distance(u, exact) / norm(exact);
+}
+
+} // namespace
+
+TEST(CpuEngine, SortingByKeyIsStable) {
+    std::vector<int> start, order;
+    sortByKey({2, 0, 2, 1, 0, 5}, 6, start, order);
+    EXPECT_EQ(start, (std::vector<int>{0, 2, 3, 5, 5, 5, 6}));
+    EXPECT_EQ(order, (std::vector<int>{1, 4, 3, 0, 2, 5}));
+    sortByKey({}, 2, start, order);
+    EXPECT_EQ(start, (std::vector<int>{0, 0, 0}));
+    EXPECT_TRUE(order.empty());
+}
+
+TEST(CpuEngine, RealHalfIsItsDefinitionOnEveryInstructionSet) {
+    const std::vector<int64_t> targets = runnableTargets();
+    for (const EngineScene& scene : scenes()) {
+        const std::vector<Vec3> exact = realVelocities(scene);
+        for (int64_t target : targets) {
+            SCOPED_TRACE(scene.name + ", tolerance " + std::to_string(scene.tolerance) + ", " +
+                         hwy::TargetName(target));
+            const ChosenTarget chosen(target);
+            EXPECT_LT(realSpaceError<double>(scene, exact), 1e-12);
+            EXPECT_LT(realSpaceError<float>(scene, exact), 2e-6);
+        }
+    }
+}
+
+TEST(CpuEngine, EveryInstructionSetGivesTheSameStep) {
+    const std::vector<int64_t> targets = runnableTargets();
+    ASSERT_GE(targets.size(), 1u);
+    for (EngineScene scene : scenes()) {
+        const bool single = scene.plan.precision == Precision::Single;
+        scene.plan.lanczosTolerance = single ? 1e-5 : 1e-10; // hides no difference
+        const std::vector<Vec3> expected = velocities(scene, 1, Precision::Double);
+        for (int64_t target : targets) {
+            SCOPED_TRACE(scene.name + ", tolerance " + std::to_string(scene.tolerance) + ", " +
+                         hwy::TargetName(target));
+            const ChosenTarget chosen(target);
+            // The square root magnifies rounding where overlaps make M_R nearly singular.
+            EXPECT_LT(distance(velocities(scene, 1, Precision::Double), expected),
+                      1e-8 * norm(expected));
+            if (single) {
+                EXPECT_LT(distance(velocities(scene, 1, Precision::Single), expected),
+                          5e-5 * norm(expected));
+            }
+        }
+    }
+}
+
+TEST(CpuEngine, BitsDependNeitherOnThreadsNorOnEarlierPositions) {
+    EngineScene scene = makeScene("cube", Lattice::orthorhombic(40, 40, 45), 3000, 1e-3);
+    std::vector<Vec3> elsewhere = scene.positions;
+    for (size_t i = 0; i < elsewhere.size(); i++)
+        elsewhere[i] += Vec3(1.5 * (i % 3), 0.7 * (i % 5), -0.3 * (i % 7));
+    for (Precision precision : {Precision::Single, Precision::Double}) {
+        const std::vector<Vec3> expected = velocities(scene, 1, precision);
+        for (int threads : {2, 3, 5})
+            EXPECT_EQ(velocities(scene, threads, precision), expected) << threads << " threads";
+        EXPECT_EQ(velocities(scene, 2, precision, &elsewhere), expected);
+    }
+}
