@@ -16,35 +16,63 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int LANES = WAVE_LANES;
 
+/** The last word of the counter block: see normals() of Noise.h. */
+HWY_INLINE uint32_t lastWord(const numerics::NoiseKey& key, uint32_t part) {
+    return (uint32_t(key.counter >> 32) & 0xFFFFu) | (part << 16);
+}
+
 /** The first two words of the counter block for LANES indices of 64 bits. */
 struct NoiseIndices {
     uint32_t low[LANES], high[LANES];
 };
 
+#if HWY_TARGET == HWY_SCALAR
 /** philox() of Noise.h for LANES indices: four rows of words. */
 HWY_INLINE void philoxRow(const numerics::NoiseKey& key, uint32_t part, const NoiseIndices& index,
                           uint32_t words[4][LANES]) {
-    const uint32_t step = uint32_t(key.counter),
-                   last = (uint32_t(key.counter >> 32) & 0xFFFFu) | (part << 16);
     for (int i = 0; i < LANES; i++) {
-        uint32_t c0 = index.low[i], c1 = index.high[i], c2 = step, c3 = last;
+        const std::array<uint32_t, 4> own = numerics::philox(
+            {index.low[i], index.high[i], uint32_t(key.counter), lastWord(key, part)},
+            {key.seed, uint32_t(key.stream)});
+        for (int word = 0; word < 4; word++)
+            words[word][i] = own[word];
+    }
+}
+#else
+/**
+ * philox() of Noise.h for LANES indices: four rows of words. Each index has a lane of 64 bits, of
+ * which multiplications read the lower half; what is in the upper half does not matter.
+ */
+HWY_INLINE void philoxRow(const numerics::NoiseKey& key, uint32_t part, const NoiseIndices& index,
+                          uint32_t words[4][LANES]) {
+    const hn::CappedTag<uint64_t, LANES> d;
+    const hn::Repartition<uint32_t, decltype(d)> halves;
+    const hn::Rebind<uint32_t, decltype(d)> narrow;
+    const auto product = [&](auto a, uint32_t b) {
+        return hn::MulEven(hn::BitCast(halves, a), hn::Set(halves, b));
+    };
+    for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
+        auto c0 = hn::PromoteTo(d, hn::LoadU(narrow, index.low + i)),
+             c1 = hn::PromoteTo(d, hn::LoadU(narrow, index.high + i)),
+             c2 = hn::Set(d, uint64_t(uint32_t(key.counter))),
+             c3 = hn::Set(d, uint64_t(lastWord(key, part)));
         uint32_t k0 = key.seed, k1 = uint32_t(key.stream);
-#pragma GCC unroll 10
         for (int round = 0; round < 10; round++) {
-            const uint64_t p0 = uint64_t(0xD2511F53u) * c0, p1 = uint64_t(0xCD9E8D57u) * c2;
-            c0 = uint32_t(p1 >> 32) ^ c1 ^ k0;
-            c1 = uint32_t(p1);
-            c2 = uint32_t(p0 >> 32) ^ c3 ^ k1;
-            c3 = uint32_t(p0);
+            const auto p0 = product(c0, 0xD2511F53u), p1 = product(c2, 0xCD9E8D57u);
+            c0 = hn::Xor(hn::Xor(hn::ShiftRight<32>(p1), c1), hn::Set(d, uint64_t(k0)));
+            c2 = hn::Xor(hn::Xor(hn::ShiftRight<32>(p0), c3), hn::Set(d, uint64_t(k1)));
+            c1 = p1;
+            c3 = p0;
             k0 += 0x9E3779B9u;
             k1 += 0xBB67AE85u;
         }
-        words[0][i] = c0;
-        words[1][i] = c1;
-        words[2][i] = c2;
-        words[3][i] = c3;
+        hn::StoreU(hn::TruncateTo(narrow, c0), narrow, words[0] + i);
+        hn::StoreU(hn::TruncateTo(narrow, c1), narrow, words[1] + i);
+        hn::StoreU(hn::TruncateTo(narrow, c2), narrow, words[2] + i);
+        hn::StoreU(hn::TruncateTo(narrow, c3), narrow, words[3] + i);
     }
 }
+#endif
 
 /** boxMuller() of Noise.h for LANES pairs of words; each number times `scale`. */
 template <class Real>
@@ -140,10 +168,11 @@ HWY_INLINE void scaleRow(const WaveColumns<Real>& columns, int nx, const Real* H
 }
 
 template <class Real> HWY_INLINE bool anyKept(const Real* factors) {
-    Real sum = 0; // none is negative
-    for (int i = 0; i < LANES; i++)
-        sum += factors[i];
-    return sum > 0;
+    const hn::CappedTag<Real, LANES> d;
+    auto largest = hn::Zero(d); // none is negative
+    for (size_t i = 0; i < LANES; i += hn::Lanes(d))
+        largest = hn::Max(largest, hn::LoadU(d, factors + i));
+    return !hn::AllTrue(d, hn::Eq(largest, hn::Zero(d)));
 }
 
 template <class Real>
