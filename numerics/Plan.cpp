@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "numerics/HasimotoSplit.h"
 #include "numerics/Plan.h"
 #include "numerics/PlanCost.h"
 #include "numerics/Quadrature.h"

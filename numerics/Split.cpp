@@ -1,88 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/Split.h"
 #include "numerics/Quadrature.h"
-#include <algorithm>
 #include <cmath>
 
 namespace PSE::numerics {
-
-namespace {
-
-/**
- * j1(x)/x and j2(x)/x^2 (spherical Bessel), by their series below x = 0.5 where the closed forms
- * cancel.
- */
-struct BesselRatios {
-    double j0, j1x, j2x2;
-};
-
-BesselRatios besselRatios(double x) {
-    const double x2 = x * x;
-    if (x < 0.5)
-        return {
-            1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42 * (1 - x2 / 72 * (1 - x2 / 110)))),
-            1.0 / 3 -
-                x2 * (1.0 / 30 - x2 * (1.0 / 840 -
-                                       x2 * (1.0 / 45360 - x2 * (1.0 / 3991680 - x2 / 518918400)))),
-            1.0 / 15 - x2 * (1.0 / 210 - x2 * (1.0 / 7560 - x2 * (1.0 / 498960 - x2 / 51891840)))};
-    const double j0 = std::sin(x) / x;
-    const double j1x = (j0 - std::cos(x)) / x2;
-    return {j0, j1x, (3 * j1x - j0) / x2};
-}
-
-constexpr int TAIL_POINTS = 160;
-constexpr double CONTACT = 2; ///< distance of two touching spheres in radii
-
-/**
- * For each point of an equidistant table of f >= 0, the integral from there to the last point.
- */
-std::vector<double> integralsToInfinity(const std::vector<double>& f, double step) {
-    std::vector<double> integrals(f.size(), 0.0);
-    for (size_t i = f.size() - 1; i-- > 0;) {
-        // f decays like a Gaussian: a trapezium in its logarithm is far better than one in its
-        // value.
-        const double slope = (f[i] > 0 && f[i + 1] > 0 ? std::log(f[i] / f[i + 1]) : 0);
-        const double area =
-            (std::fabs(slope) > 1e-3 ? (f[i] - f[i + 1]) / slope : 0.5 * (f[i] + f[i + 1]));
-        integrals[i] = integrals[i + 1] + step * area;
-    }
-    return integrals;
-}
-
-/** A table at a fractional index, linear in the logarithm; constant beyond its ends. */
-double logarithmicMean(const std::vector<double>& table, double index) {
-    const int i = std::clamp(static_cast<int>(index), 0, static_cast<int>(table.size()) - 2);
-    const double x = std::clamp(index - i, 0.0, 1.0);
-    return std::exp((1 - x) * std::log(std::max(table[i], 1e-300)) +
-                    x * std::log(std::max(table[i + 1], 1e-300)));
-}
-
-} // namespace
-
-void Split::prepare(double kMax, double range) {
-    largestWaveNumber = kMax;
-    largestDistance = range;
-    // A Gauss-Legendre rule resolves cos(k r) on [0, kMax] once it has kMax r/2 nodes; w itself
-    // oscillates as cos(2 k).
-    const int n = static_cast<int>(60 + 0.6 * kMax * (range + 2));
-    const Quadrature rule = gaussLegendre(n, 0, kMax);
-    waveNumbers = rule.nodes;
-    weights.resize(n);
-    for (int i = 0; i < n; i++)
-        weights[i] = 3 / M_PI * rule.weights[i] * waveWeight(rule.nodes[i]);
-    prepareTails();
-}
-
-SmoothScalars Split::waveScalars(double r) const {
-    SmoothScalars sum = {0, 0};
-    for (size_t i = 0; i < weights.size(); i++) {
-        const double k = waveNumbers[i];
-        const BesselRatios j = besselRatios(k * r);
-        sum.F += weights[i] * (j.j0 - j.j1x);
-        sum.C += weights[i] * k * k * j.j2x2;
-    }
-    return sum;
-}
 
 PairScalars Split::realScalars(double r) const {
     const PairScalars total = rpyScalars(r);
@@ -90,25 +11,29 @@ PairScalars Split::realScalars(double r) const {
     return {total.F - wave.F, total.G - wave.F - wave.C * r * r};
 }
 
-double Split::waveTruncation(double kMax, double phi) const {
-    if (kMax >= largestWaveNumber)
-        return 0;
-    const double density = 3 * phi / (4 * M_PI);
-    const Quadrature rule =
-        gaussLegendre(64, kMax, std::min(largestWaveNumber, kMax + 0.8 * largestWaveNumber));
-    double pairs = 0, self = 0;
+Split::DroppedWaves Split::integrateWaves(double from, double to) const {
+    static const Quadrature rule = gaussLegendre(64, -1, 1);
+    const double mid = 0.5 * (from + to), half = 0.5 * (to - from);
+    DroppedWaves sum = {0, 0};
     for (size_t i = 0; i < rule.nodes.size(); i++) {
-        const double k = rule.nodes[i], b = 6 * M_PI * waveWeight(k) / (k * k);
-        pairs += rule.weights[i] * b * b * k * k;
-        self += rule.weights[i] * b * k * k;
+        const double k = mid + half * rule.nodes[i], w = waveWeight(k);
+        sum.pairs += half * rule.weights[i] * w * w / (k * k);
+        sum.self += half * rule.weights[i] * w;
     }
-    // mean of |I - kk|, measure of the k integral
-    const double projection = (2.0 / 3) / (2 * M_PI * M_PI);
-    return std::sqrt(density * projection * pairs + projection * projection * self * self);
+    return sum;
+}
+
+double Split::waveTruncation(double kMax, double phi) const {
+    const double density = 3 * phi / (4 * M_PI);
+    const DroppedWaves dropped = droppedWaves(kMax);
+    // b = 6 pi w/k^2; mean of |I - kk|, measure of the k integral
+    const double factor = 6 * M_PI, projection = (2.0 / 3) / (2 * M_PI * M_PI);
+    const double self = projection * factor * dropped.self;
+    return std::sqrt(density * projection * factor * factor * dropped.pairs + self * self);
 }
 
 double Split::waveCutoff(double error, double phi) const {
-    double low = 0.02 * largestWaveNumber, high = largestWaveNumber;
+    double low = 0.02 * largestWaveNumber(), high = largestWaveNumber();
     while (high - low > 1e-4 * high) {
         const double mid = 0.5 * (low + high);
         (waveTruncation(mid, phi) > error ? low : high) = mid;
@@ -116,49 +41,15 @@ double Split::waveCutoff(double error, double phi) const {
     return high;
 }
 
-double Split::tailDistance(int i) const {
-    return CONTACT + (largestDistance - CONTACT) * i / (TAIL_POINTS - 1);
-}
-
-void Split::prepareTails() {
-    std::vector<double> random(TAIL_POINTS), coherent(TAIL_POINTS);
-    for (int i = 0; i < TAIL_POINTS; i++) {
-        const double r = tailDistance(i);
-        const PairScalars s = realScalars(r);
-        random[i] = 4 * M_PI * r * r * (2 * s.F * s.F + s.G * s.G) / 3;
-        coherent[i] = 4 * M_PI * r * r * std::fabs(2 * s.F + s.G) / 3;
-    }
-    randomTail = integralsToInfinity(random, tailDistance(1) - tailDistance(0));
-    coherentTail = integralsToInfinity(coherent, tailDistance(1) - tailDistance(0));
-}
-
-double Split::realTruncation(double rc, double phi, double meanPhi) const {
-    const double position = (rc - CONTACT) / (largestDistance - CONTACT) * (TAIL_POINTS - 1);
-    const double random = 3 * phi / (4 * M_PI) * logarithmicMean(randomTail, position);
-    const double alike = 3 * meanPhi / (4 * M_PI) * logarithmicMean(coherentTail, position);
-    return std::sqrt(random + alike * alike);
-}
-
 double Split::realCutoff(double error, double phi, double meanPhi) const {
     if (realTruncation(CONTACT, phi, meanPhi) <= error)
         return CONTACT;
-    double low = CONTACT, high = largestDistance;
+    double low = CONTACT, high = maxDistance();
     while (high - low > 1e-5 * high) {
         const double mid = 0.5 * (low + high);
         (realTruncation(mid, phi, meanPhi) > error ? low : high) = mid;
     }
     return high;
-}
-
-HasimotoSplit::HasimotoSplit(double xi) : xi(xi) {
-    // exp(-k^2/4xi^2) is 4e-19 at k = 13 xi; the real part of separate spheres decays as exp(-xi^2
-    // (r - 2)^2).
-    prepare(13 * xi, CONTACT + 8 / xi);
-}
-
-double HasimotoSplit::waveWeight(double k) const {
-    const double sinc = (k < 1e-4 ? 1 - k * k / 6 : std::sin(k) / k), q = k * k / (4 * xi * xi);
-    return sinc * sinc * (1 + q) * std::exp(-q);
 }
 
 } // namespace PSE::numerics

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The error estimates behind the Plan against errors measured by explicit sums.
 
+#include "numerics/HasimotoSplit.h"
 #include "numerics/Plan.h"
 #include "numerics/Window.h"
 #include <array>

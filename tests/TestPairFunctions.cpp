@@ -4,7 +4,7 @@
 
 #include "numerics/Lattice.h"
 #include "numerics/RealTable.h"
-#include "numerics/Split.h"
+#include "numerics/HasimotoSplit.h"
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>

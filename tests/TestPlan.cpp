@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From one tolerance to numbers: what a Plan promises, chooses and refuses.
 
+#include "numerics/HasimotoSplit.h"
 #include "numerics/Plan.h"
 #include "numerics/Window.h"
 #include <array>

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_NUMERICS_PROLATESPLIT_H_
+#define OPENMMPSE_NUMERICS_PROLATESPLIT_H_
+
+#include "numerics/ProlateFunction.h"
+#include "numerics/Split.h"
+#include <vector>
+
+namespace PSE::numerics {
+
+/**
+ * The matched prolate split [T19-T22]: w(k) = W(k) up to the first zero k0 of W, and 0 beyond,
+ *
+ *     W(k) = H0(k) - s k H0'(k),   H0(k) = psi(k R/c),   s = 1/2 (1 - 2 c^2/(3 chi R^2)),
+ *
+ * psi the ProlateFunction of bandwidth c. W = 1 - k^2/3 + O(k^4), as sinc^2, and its inverse
+ * Fourier transform is zero beyond R: RPY minus the wave part of W is exactly zero beyond R. What
+ * is dropped beyond k0 is the error that c decides.
+ */
+class ProlateSplit : public Split {
+public:
+    /// what isPositive() demands
+    static constexpr double LARGEST_ZERO = 3, SMALLEST_MATCHING = 0.05, SMALLEST_RANGE = 2.4;
+    /// bandwidths that serve the tolerances of a Plan, 1e-1 to 1e-10
+    static constexpr double SMALLEST_BANDWIDTH = 3, LARGEST_BANDWIDTH = 30;
+
+    /**
+     * @param bandwidth  c
+     * @param range      R in radii, > 2
+     */
+    ProlateSplit(double bandwidth, double range);
+    std::string name() const override { return "Prolate"; }
+    double waveWeight(double k) const override;
+    /** Of the unclipped W, in closed form [T20]; RPY itself beyond R. Absolute error 1e-13 up to c
+     * = 20, 1e-12 at 30. */
+    SmoothScalars waveScalars(double r) const override;
+    double maxDistance() const override { return R; }
+    double tableRange(bool single) const override;
+    using Split::realTruncation;
+    double realTruncation(double rc, double phi, double meanPhi) const override;
+
+    double bandwidth() const { return psi.bandwidth(); }
+    double range() const { return R; }
+    /** s, the share of the matching term. */
+    double matching() const { return s; }
+    /** k0, beyond which w is zero. */
+    double firstZero() const { return k0; }
+    /**
+     * Whether w <= sinc^2 for every k, to rounding, and the estimates hold [T21].
+     */
+    bool isPositive() const;
+
+protected:
+    DroppedWaves droppedWaves(double kMax) const override;
+    double largestWaveNumber() const override { return k0; }
+
+private:
+    double findZero() const;
+    double pairsBeyondZero() const;
+
+    ProlateFunction psi;
+    double R, s, k0;
+    EvenLegendreSeries slope, W;          ///< x psi' and W, in x = k R/c
+    std::vector<double> seriesF, seriesC; ///< in (r/R)^2
+    DroppedWaves beyond;                  ///< of W beyond k0
+};
+
+} // namespace PSE::numerics
+
+#endif
