@@ -26,6 +26,7 @@ public:
     double realTruncation(double rc, double phi, double meanPhi) const override;
 
 protected:
+    using Split::droppedWaves;
     DroppedWaves droppedWaves(double kMax) const override;
     double largestWaveNumber() const override { return kEnd; }
 

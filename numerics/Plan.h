@@ -2,7 +2,7 @@
 #ifndef OPENMMPSE_NUMERICS_PLAN_H_
 #define OPENMMPSE_NUMERICS_PLAN_H_
 
-// One tolerance becomes numbers here and nowhere else [T11-T16]. Lengths in nm.
+// One tolerance becomes numbers here and nowhere else [T11-T16, T22, T23]. Lengths in nm.
 
 #include "numerics/Lattice.h"
 #include "numerics/Split.h"
@@ -15,9 +15,18 @@ namespace PSE::numerics {
 
 enum class Precision { Single, Double };
 
+enum class SplitChoice {
+    Automatic, ///< prolate where valid, unless Hasimoto's is cheaper by more than a few percent
+    Prolate,   ///< or a refusal
+    Hasimoto
+};
+
 /** What a caller may prescribe; zero means automatic. */
 struct PlanOverrides {
-    double xi = 0, realCutoff = 0;
+    /// splitting parameter (1/nm): Hasimoto's, or 1/range of the prolate split
+    double xi = 0;
+    double realCutoff = 0; ///< nm; of the prolate split its range
+    double bandwidth = 0;  ///< c of the prolate split; ignored by Hasimoto's
     std::array<int, 3> grid = {0, 0, 0};
     int windowSupport = 0;
     double windowShape = 0, lanczosTolerance = 0;
@@ -35,14 +44,17 @@ struct PlanRequest {
     /// the platform sums over modes directly, without a grid (Reference)
     bool directSums;
     PlanOverrides overrides;
+    SplitChoice split = SplitChoice::Automatic;
 };
 
 /** Everything a platform needs to know about the numerics. */
 struct Plan {
     std::shared_ptr<const Split> split; ///< in reduced units (lengths in a)
     double a;                           ///< radius
-    double xi;                          ///< splitting parameter (1/nm)
-    double realCutoff;                  ///< range of the real half
+    std::string splitReason;            ///< why this one, in words
+    double xi;         ///< splitting parameter (1/nm); of the prolate split 1/range
+    double bandwidth;  ///< c of the prolate split, else 0
+    double realCutoff; ///< range of the real half
     /// the range exceeds half the box: sum explicitly over all images
     bool sumImages;
     std::array<int, 3> grid; ///< M_d
@@ -58,8 +70,9 @@ struct Plan {
 };
 
 /**
- * Choose all parameters so that each half is in error by at most tolerance/2 for unit random forces
- * at volume fraction max(phi, 0.3), at the lowest cost by the model of PlanCost.h.
+ * Choose all parameters so that the predicted error for unit random forces at volume fraction
+ * max(phi, 0.3) keeps the tolerance (with Hasimoto's split each half at most tolerance/2), at the
+ * lowest cost by the model of PlanCost.h.
  * @throws std::invalid_argument naming what cannot be met
  */
 Plan makePlan(const PlanRequest& request);

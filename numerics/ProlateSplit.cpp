@@ -88,39 +88,62 @@ double ProlateSplit::pairsBeyondZero() const {
     const double c = psi.bandwidth(), chi = psi.eigenvalue(), x0 = k0 * R / c;
     if (x0 <= 1) // s < 0 has moved the zero into the band: no use as a split
         return std::numeric_limits<double>::infinity();
-    double t = std::acosh(x0), y = psi(x0), dy = slope(x0) / x0 * std::sinh(t);
-    const auto acceleration = [&](double t, double y, double dy) {
-        const double x = std::cosh(t);
-        return (chi - c * c * x * x) * y - dy * x / std::sinh(t);
+    const double z0 = std::sqrt(x0 * x0 - 1);
+    double growth = x0 + z0; // exp t
+    double y = psi(x0), dy = slope(x0) / x0 * z0;
+    struct Place {
+        double x, z; // cosh t, sinh t
+        explicit Place(double e) : x(0.5 * (e + 1 / e)), z(0.5 * (e - 1 / e)) {}
     };
-    const auto density = [&](double t, double y, double dy) { // W^2/x^2 dx/dt
-        const double x = std::cosh(t), weight = y - s * dy * x / std::sinh(t);
-        return weight * weight / (x * x) * std::sinh(t);
+    const auto acceleration = [&](const Place& p, double y, double dy) {
+        return (chi - c * c * p.x * p.x) * y - dy * p.x / p.z;
     };
-    double sum = 0, x = x0, before = density(t, y, dy);
-    while (x < x0 + PERIODS * M_PI / c) {
-        const double h = PHASE_STEP / (c * x); // classical Runge-Kutta, Simpson's rule
-        const double k1 = acceleration(t, y, dy), y2 = y + 0.5 * h * dy, d2 = dy + 0.5 * h * k1;
-        const double k2 = acceleration(t + 0.5 * h, y2, d2), y3 = y + 0.5 * h * d2,
-                     d3 = dy + 0.5 * h * k2;
-        const double k3 = acceleration(t + 0.5 * h, y3, d3), y4 = y + h * d3, d4 = dy + h * k3;
-        const double middle = 0.5 * (density(t + 0.5 * h, y2, d2) + density(t + 0.5 * h, y3, d3));
+    const auto density = [&](const Place& p, double y, double dy) { // W^2/x^2 dx/dt
+        const double weight = y - s * dy * p.x / p.z;
+        return weight * weight / (p.x * p.x) * p.z;
+    };
+    Place here(growth);
+    double sum = 0, before = density(here, y, dy);
+    while (here.x < x0 + PERIODS * M_PI / c) {
+        const double h = PHASE_STEP / (c * here.x); // classical Runge-Kutta, Simpson's rule
+        const double half = std::exp(0.5 * h);
+        const Place mid(growth * half), end(growth * half * half);
+        const double k1 = acceleration(here, y, dy), y2 = y + 0.5 * h * dy, d2 = dy + 0.5 * h * k1;
+        const double k2 = acceleration(mid, y2, d2), y3 = y + 0.5 * h * d2, d3 = dy + 0.5 * h * k2;
+        const double k3 = acceleration(mid, y3, d3), y4 = y + h * d3, d4 = dy + h * k3;
+        const double middle = 0.5 * (density(mid, y2, d2) + density(mid, y3, d3));
         y += h / 6 * (dy + 2 * d2 + 2 * d3 + d4);
-        dy += h / 6 * (k1 + 2 * k2 + 2 * k3 + acceleration(t + h, y4, d4));
-        t += h;
-        x = std::cosh(t);
-        const double after = density(t, y, dy);
+        dy += h / 6 * (k1 + 2 * k2 + 2 * k3 + acceleration(end, y4, d4));
+        growth *= half * half;
+        here = end;
+        const double after = density(here, y, dy);
         sum += h / 6 * (before + 4 * middle + after);
         before = after;
     }
     const double g = psi.edge() / psi.integral();
-    return R / c * (sum + 2 * s * s * g * g / std::sqrt(x * x - 1));
+    return R / c * (sum + 2 * s * s * g * g / here.z);
 }
 
 Split::DroppedWaves ProlateSplit::droppedWaves(double kMax) const {
     if (kMax >= k0)
         return beyond;
     const DroppedWaves inside = integrateWaves(kMax, k0);
+    return {beyond.pairs + inside.pairs, beyond.self + inside.self};
+}
+
+Split::DroppedWaves ProlateSplit::droppedWaves(const std::array<double, 3>& faces) const {
+    const double nearest = *std::min_element(faces.begin(), faces.end());
+    if (nearest >= k0)
+        return beyond;
+    // w ends so close to the faces that the sphere inside them would count far too much: of a shell
+    // of radius k, the two caps beyond a pair of faces at f are 1 - f/k.
+    const auto share = [&](double k) {
+        double outside = 0;
+        for (double face : faces)
+            outside += std::max(0.0, 1 - face / k);
+        return std::min(1.0, outside);
+    };
+    const DroppedWaves inside = integrateWaves(nearest, k0, share);
     return {beyond.pairs + inside.pairs, beyond.self + inside.self};
 }
 

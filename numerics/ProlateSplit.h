@@ -52,6 +52,7 @@ public:
 
 protected:
     DroppedWaves droppedWaves(double kMax) const override;
+    DroppedWaves droppedWaves(const std::array<double, 3>& faces) const override;
     double largestWaveNumber() const override { return k0; }
 
 private:

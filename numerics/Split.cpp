@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/Split.h"
 #include "numerics/Quadrature.h"
+#include <algorithm>
 #include <cmath>
 
 namespace PSE::numerics {
@@ -11,21 +12,33 @@ PairScalars Split::realScalars(double r) const {
     return {total.F - wave.F, total.G - wave.F - wave.C * r * r};
 }
 
-Split::DroppedWaves Split::integrateWaves(double from, double to) const {
+Split::DroppedWaves Split::integrateWaves(double from, double to,
+                                          const std::function<double(double)>& share) const {
     static const Quadrature rule = gaussLegendre(64, -1, 1);
     const double mid = 0.5 * (from + to), half = 0.5 * (to - from);
     DroppedWaves sum = {0, 0};
     for (size_t i = 0; i < rule.nodes.size(); i++) {
         const double k = mid + half * rule.nodes[i], w = waveWeight(k);
-        sum.pairs += half * rule.weights[i] * w * w / (k * k);
-        sum.self += half * rule.weights[i] * w;
+        sum.pairs += half * rule.weights[i] * share(k) * w * w / (k * k);
+        sum.self += half * rule.weights[i] * share(k) * w;
     }
     return sum;
 }
 
+Split::DroppedWaves Split::droppedWaves(const std::array<double, 3>& faces) const {
+    return droppedWaves(*std::min_element(faces.begin(), faces.end()));
+}
+
 double Split::waveTruncation(double kMax, double phi) const {
+    return errorOf(droppedWaves(kMax), phi);
+}
+
+double Split::bandTruncation(const std::array<double, 3>& faces, double phi) const {
+    return errorOf(droppedWaves(faces), phi);
+}
+
+double Split::errorOf(const DroppedWaves& dropped, double phi) const {
     const double density = 3 * phi / (4 * M_PI);
-    const DroppedWaves dropped = droppedWaves(kMax);
     // b = 6 pi w/k^2; mean of |I - kk|, measure of the k integral
     const double factor = 6 * M_PI, projection = (2.0 / 3) / (2 * M_PI * M_PI);
     const double self = projection * factor * dropped.self;

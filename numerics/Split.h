@@ -13,6 +13,8 @@
 // pi eta a).
 
 #include "numerics/Rpy.h"
+#include <array>
+#include <functional>
 #include <string>
 
 namespace PSE::numerics {
@@ -58,6 +60,11 @@ public:
      */
     double waveTruncation(double kMax, double phi) const;
     /**
+     * The same for all wave vectors outside the Nyquist cell of a grid, or more [T14].
+     * @param faces  distances of the three pairs of faces of that cell from k = 0
+     */
+    double bandTruncation(const std::array<double, 3>& faces, double phi) const;
+    /**
      * Smallest wave number above which waveTruncation() is at most error; the end of w if none is.
      */
     double waveCutoff(double error, double phi) const;
@@ -83,10 +90,20 @@ protected:
     };
     /** The same over [kMax, infinity), 0 < kMax. */
     virtual DroppedWaves droppedWaves(double kMax) const = 0;
-    /** Over [from, to], w alone: 64 Gauss-Legendre nodes. */
-    DroppedWaves integrateWaves(double from, double to) const;
+    /** The same outside a cell; unless a split knows better, outside the sphere inside it. */
+    virtual DroppedWaves droppedWaves(const std::array<double, 3>& faces) const;
+    /**
+     * Over [from, to], w alone: 64 Gauss-Legendre nodes.
+     * @param share  of the directions, by k
+     */
+    DroppedWaves integrateWaves(
+        double from, double to,
+        const std::function<double(double)>& share = [](double) { return 1.0; }) const;
     /** Beyond, w is zero or below 1e-17. */
     virtual double largestWaveNumber() const = 0;
+
+private:
+    double errorOf(const DroppedWaves& dropped, double phi) const;
 };
 
 } // namespace PSE::numerics

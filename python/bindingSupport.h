@@ -80,8 +80,9 @@ inline int particleCount(const OpenMM::Integrator& integrator) {
 
 /** New reference to the dict that Python sees for NumericalParameters. */
 inline PyObject* toDict(const NumericalParameters& p) {
-    return Py_BuildValue("{s:s,s:d,s:d,s:(iii),s:i,s:d,s:d,s:i,s:d,s:s,s:i}", "split",
-                         p.split.c_str(), "xi", p.xi, "realCutoff", p.realCutoff, "gridDimensions",
+    return Py_BuildValue("{s:s,s:d,s:d,s:d,s:(iii),s:i,s:d,s:d,s:i,s:d,s:s,s:i}", "split",
+                         p.split.c_str(), "xi", p.xi, "realCutoff", p.realCutoff,
+                         "prolateBandwidth", p.prolateBandwidth, "gridDimensions",
                          p.gridDimensions[0], p.gridDimensions[1], p.gridDimensions[2],
                          "windowSupport", p.windowSupport, "windowShape", p.windowShape,
                          "lanczosTolerance", p.lanczosTolerance, "lanczosIterations",

@@ -62,8 +62,8 @@ PSE_WITHOUT_GIL(sampleBrownianDisplacements)
 %typemap(in) const PSE::NumericalParameters& (PSE::NumericalParameters parameters) {
     const char* split;
     int* grid = parameters.gridDimensions;
-    if (!PyArg_ParseTuple($input, "sdd(iii)iddi", &split, &parameters.xi, &parameters.realCutoff,
-            &grid[0], &grid[1], &grid[2], &parameters.windowSupport, &parameters.windowShape,
+    if (!PyArg_ParseTuple($input, "sddd(iii)iddi", &split, &parameters.xi, &parameters.realCutoff,
+            &parameters.prolateBandwidth, &grid[0], &grid[1], &grid[2], &parameters.windowSupport, &parameters.windowShape,
             &parameters.lanczosTolerance, &parameters.randomSeed))
         SWIG_fail;
     parameters.split = split;

@@ -21,6 +21,7 @@ constexpr int ALL_FORCE_GROUPS = -1; // all bits set
 void writeRequested(const NumericalParameters& requested, SerializationNode& node) {
     node.setDoubleProperty("xi", requested.xi);
     node.setDoubleProperty("realCutoff", requested.realCutoff);
+    node.setDoubleProperty("prolateBandwidth", requested.prolateBandwidth);
     node.setIntProperty("gridX", requested.gridDimensions[0]);
     node.setIntProperty("gridY", requested.gridDimensions[1]);
     node.setIntProperty("gridZ", requested.gridDimensions[2]);
@@ -33,6 +34,7 @@ NumericalParameters readRequested(const SerializationNode& node) {
     NumericalParameters requested;
     requested.xi = node.getDoubleProperty("xi");
     requested.realCutoff = node.getDoubleProperty("realCutoff");
+    requested.prolateBandwidth = node.getDoubleProperty("prolateBandwidth", 0);
     requested.gridDimensions[0] = node.getIntProperty("gridX");
     requested.gridDimensions[1] = node.getIntProperty("gridY");
     requested.gridDimensions[2] = node.getIntProperty("gridZ");

@@ -3,6 +3,7 @@
 
 #include "numerics/HasimotoSplit.h"
 #include "numerics/Plan.h"
+#include "numerics/ProlateSplit.h"
 #include "numerics/Window.h"
 #include <array>
 #include <cmath>
@@ -163,6 +164,39 @@ Vectors droppedPairs(const Suspension& s, const Split& split, double rc, double 
                 u[i] += F * s.f[j] + (G - F) / (r * r) * d.dot(s.f[j]) * d;
             }
     return u;
+}
+
+/** The whole real half, self mobility and images included. */
+Vectors realVelocities(const Suspension& s, const Split& split, double range) {
+    Vectors u(s.x.size());
+    const Vectors images = s.box.imagesWithin(range);
+    for (size_t i = 0; i < s.x.size(); i++) {
+        u[i] = split.realSelf() * s.f[i];
+        for (size_t j = 0; j < s.x.size(); j++)
+            for (const Vec3& image : images) {
+                const Vec3 d = s.x[i] - s.x[j] + image;
+                const double r = d.norm();
+                if (r == 0 || r > range)
+                    continue;
+                const PairScalars p = split.realScalars(r);
+                u[i] += p.F * s.f[j] + (p.G - p.F) / (r * r) * d.dot(s.f[j]) * d;
+            }
+    }
+    return u;
+}
+
+Vectors sum(const Vectors& u, const Vectors& v) {
+    Vectors s(u.size());
+    for (size_t i = 0; i < u.size(); i++)
+        s[i] = u[i] + v[i];
+    return s;
+}
+
+/** M f by Hasimoto's split and exact waves: error below 1e-13. */
+Vectors exactProduct(const Suspension& s, double xi) {
+    const HasimotoSplit split(xi);
+    return sum(exactWave(s, split, 12 * xi),
+               realVelocities(s, split, std::min(2 + 6 / xi, split.maxDistance())));
 }
 
 } // namespace
@@ -334,6 +368,7 @@ TEST(Estimates, ErrorsOfAWholeProductAreBelowTheTolerance) {
         for (bool tilted : {false, true}) {
             const Suspension s(boxFor(80, 0.2, tilted), 80, 21);
             PlanRequest request = {s.box, 80, 1.0, tolerance, true, 1e-5, false, {}};
+            request.split = SplitChoice::Hasimoto;
             request.overrides.xi = 0.6;
             const Plan plan = makePlan(request);
             const Window window(plan.windowSupport, plan.windowShape);
@@ -344,5 +379,91 @@ TEST(Estimates, ErrorsOfAWholeProductAreBelowTheTolerance) {
             EXPECT_LT(rms(difference(error, real)), tolerance);
             EXPECT_GT(rms(difference(error, real)), 0.02 * tolerance)
                 << "far too accurate: time is wasted";
+        }
+}
+
+TEST(Estimates, DroppedWavesOfTheProlateSplitAreTheMeasuredError) {
+    // Everything but the waves beyond k0, against M f by the other split.
+    for (double phi : {0.05, 0.3})
+        for (bool tilted : {false, true}) {
+            const Suspension s(boxFor(120, phi, tilted), 120, 13);
+            const Vectors exact = exactProduct(s, 0.6);
+            for (const auto& [c, R] : {std::pair{6.0, 3.5}, {9.0, 4.0}, {9.0, 6.0}, {14.0, 5.5}}) {
+                const ProlateSplit split(c, R);
+                ASSERT_TRUE(split.isPositive());
+                const Vectors u =
+                    sum(exactWave(s, split, split.firstZero()), realVelocities(s, split, R));
+                const double ratio =
+                    rms(difference(u, exact)) / split.waveTruncation(split.firstZero(), phi);
+                EXPECT_GT(ratio, 0.7) << phi << " " << c << " " << R;
+                EXPECT_LT(ratio, 1.4) << phi << " " << c << " " << R;
+            }
+        }
+}
+
+TEST(Estimates, WaveErrorOfTheProlateSplitIsTheMeasuredError) {
+    struct Case {
+        int P;
+        double beta, c, R, finer;
+        bool tilted;
+    };
+    // as Plans choose them, coarser and finer
+    for (const Case& k : {Case{4, 7.6, 6.5, 4, 1.06, false},
+                          {4, 7.6, 6.5, 4, 1.3, true},
+                          {5, 9.9, 9, 4.5, 1.06, true},
+                          {5, 9.9, 9, 4.5, 1.3, false},
+                          {6, 12.2, 11.5, 5, 1, false},
+                          {7, 14.5, 14, 5.5, 1.1, true},
+                          {8, 16.8, 16.5, 6.5, 1.08, false}}) {
+        const double phi = 0.04; // a box of many waves
+        const ProlateSplit split(k.c, k.R);
+        const Window window(k.P, k.beta);
+        const Lattice box = boxFor(50, phi, k.tilted);
+        std::array<int, 3> grid;
+        for (int d = 0; d < 3; d++)
+            grid[d] = static_cast<int>(k.finer * k.c / k.R * box.length(d) / M_PI) + 1;
+        double square = 0;
+        for (unsigned seed = 1; seed <= 3; seed++) {
+            const Suspension s(box, 50, seed);
+            const Vectors u =
+                sum(griddedWave(s, split, grid, window), realVelocities(s, split, k.R));
+            square += std::pow(rms(difference(u, exactProduct(s, 0.5))), 2) / 3;
+        }
+        const double ratio = std::sqrt(square) / waveError(split, box, grid, k.P, k.beta, phi);
+        EXPECT_GT(ratio, 0.5) << "P " << k.P << " grid " << grid[0];
+        EXPECT_LT(ratio, 1.3) << "P " << k.P << " grid " << grid[0];
+    }
+}
+
+TEST(Estimates, ErrorsOfAWholeProductWithTheProlateSplitAreBelowTheTolerance) {
+    for (double phi : {0.04, 0.3})
+        for (bool tilted : {false, true}) {
+            const int n = 40;
+            std::vector<Suspension> kinds(3, Suspension(boxFor(n, phi, tilted), n, 22));
+            for (int i = 0; i < n; i++) { // random, uniform, balanced
+                kinds[1].f[i] = Vec3(0.6, 0, 0.8);
+                kinds[2].f[i] = Vec3(0, i % 2 == 0 ? 1 : -1, 0);
+            }
+            std::vector<Vectors> exact;
+            for (const Suspension& s : kinds)
+                exact.push_back(exactProduct(s, phi < 0.1 ? 0.5 : 0.8));
+            for (double tolerance : {1e-1, 1e-2, 1e-3, 1e-4}) {
+                const Plan plan =
+                    makePlan({kinds[0].box, n, 1.0, tolerance, true, 1e-5, false, {}});
+                if (plan.split->name() != "Prolate") {
+                    EXPECT_LT(tolerance, 0.5e-2) << "every box here serves the looser ones";
+                    continue;
+                }
+                const Window window(plan.windowSupport, plan.windowShape);
+                for (size_t kind = 0; kind < kinds.size(); kind++) {
+                    const Suspension& s = kinds[kind];
+                    const Vectors u = sum(griddedWave(s, *plan.split, plan.grid, window),
+                                          realVelocities(s, *plan.split, plan.realCutoff));
+                    const double error =
+                        rms(difference(u, exact[kind])) / std::max(1.0, rms(exact[kind]));
+                    EXPECT_LT(error, tolerance) << phi << " " << kind;
+                    EXPECT_GT(error, 0.02 * tolerance) << "far too accurate: time is wasted";
+                }
+            }
         }
 }

@@ -3,6 +3,8 @@
 
 #include "numerics/HasimotoSplit.h"
 #include "numerics/Plan.h"
+#include "numerics/PlanCost.h"
+#include "numerics/ProlateSplit.h"
 #include "numerics/Window.h"
 #include <array>
 #include <cmath>
@@ -19,6 +21,11 @@ const Lattice CUBE = Lattice::orthorhombic(20, 20, 20);
 
 PlanRequest request(const Lattice& box, int n, double tolerance) {
     return {box, n, 1.0, tolerance, true, 1e-5, false, {}};
+}
+
+PlanRequest with(SplitChoice split, PlanRequest r) {
+    r.split = split;
+    return r;
 }
 
 std::string refusal(const PlanRequest& r) {
@@ -41,12 +48,35 @@ void expectMentions(const std::string& message, const std::vector<std::string>& 
 TEST(Plan, PredictedErrorKeepsTheToleranceForEveryXi) {
     for (double tolerance = 1e-1; tolerance > 0.9e-10; tolerance /= 10)
         for (double xi : {0.05, 0.2, 0.5, 1.0, 1.8}) {
-            PlanRequest r = request(CUBE, 300, tolerance);
+            PlanRequest r = with(SplitChoice::Hasimoto, request(CUBE, 300, tolerance));
             r.overrides.xi = xi;
             const Plan plan = makePlan(r);
             ASSERT_LE(plan.predictedError, tolerance) << tolerance << " " << xi;
             ASSERT_GT(plan.predictedError, 0.1 * tolerance) << tolerance << " " << xi;
         }
+}
+
+TEST(Plan, PredictedErrorKeepsTheToleranceForEveryProlateRange) {
+    int refused = 0;
+    for (double tolerance = 1e-1; tolerance > 0.9e-10; tolerance /= 10)
+        for (double range : {2.5, 4.0, 6.0, 9.5}) {
+            PlanRequest r = with(SplitChoice::Prolate, request(CUBE, 300, tolerance));
+            r.overrides.realCutoff = range;
+            if (!refusal(r).empty()) {
+                expectMentions(refusal(r), {"prolate range", "positive", "looser tolerance"});
+                refused++;
+                continue;
+            }
+            const Plan plan = makePlan(r);
+            EXPECT_EQ(plan.split->name(), "Prolate");
+            EXPECT_EQ(plan.realCutoff, range);
+            EXPECT_EQ(plan.xi, 1 / range);
+            EXPECT_LE(plan.predictedError, tolerance) << range;
+            EXPECT_GT(plan.predictedError, 0.1 * tolerance) << range;
+            EXPECT_EQ(plan.split->realTruncation(range, 0.3), 0);
+        }
+    EXPECT_GE(refused, 10); // the tightest tolerances need the widest range
+    EXPECT_LE(refused, 22);
 }
 
 TEST(Plan, PredictedErrorKeepsTheToleranceInEveryScene) {
@@ -82,7 +112,7 @@ TEST(Plan, PredictedErrorKeepsTheToleranceInEveryScene) {
 
 TEST(Plan, WindowFollowsTheRule) {
     for (double tolerance : {1e-1, 1e-3, 1e-6, 1e-10}) {
-        PlanRequest r = request(CUBE, 200, tolerance);
+        PlanRequest r = with(SplitChoice::Hasimoto, request(CUBE, 200, tolerance));
         r.overrides.xi = 0.5;
         const Plan plan = makePlan(r);
         const double error = 0.5 * tolerance; // of each half
@@ -100,7 +130,7 @@ TEST(Plan, GridFollowsTheLengthsOfTheBoxVectorsNotTheWidths) {
     const double L = 20;
     const Lattice tilted(Vec3(L, 0, 0), Vec3(0.5 * L, L, 0), Vec3(0.5 * L, 0.5 * L, L));
     for (double tolerance : {1e-2, 1e-5}) {
-        PlanRequest r = request(tilted, 200, tolerance);
+        PlanRequest r = with(SplitChoice::Hasimoto, request(tilted, 200, tolerance));
         r.overrides.xi = 0.6;
         const Plan plan = makePlan(r);
         const double nyquist = plan.split->waveCutoff(0.5 * tolerance, 0.3);
@@ -110,6 +140,20 @@ TEST(Plan, GridFollowsTheLengthsOfTheBoxVectorsNotTheWidths) {
         EXPECT_GT(plan.grid[1], plan.grid[0]);
         // No kept mode is needlessly far out either.
         EXPECT_LT(M_PI * plan.grid[2] / tilted.length(2), 1.8 * nyquist);
+    }
+}
+
+TEST(Plan, ProlateGridFollowsTheLengthsOfTheBoxVectors) {
+    const double L = 20;
+    const Lattice tilted(Vec3(L, 0, 0), Vec3(0.5 * L, L, 0), Vec3(0.5 * L, 0.5 * L, L));
+    for (double tolerance : {1e-2, 1e-5}) {
+        const Plan plan = makePlan(with(SplitChoice::Prolate, request(tilted, 200, tolerance)));
+        const double unit = plan.bandwidth / plan.realCutoff; // about the Nyquist wave number
+        for (int d = 0; d < 3; d++) {
+            EXPECT_GT(M_PI * plan.grid[d] / tilted.length(d), 0.9 * unit) << d;
+            EXPECT_LT(M_PI * plan.grid[d] / tilted.length(d), 1.8 * unit) << d;
+        }
+        EXPECT_GT(plan.grid[2], plan.grid[0]);
     }
 }
 
@@ -153,9 +197,164 @@ TEST(Plan, EachOverrideAloneLeavesTheRestAutomatic) {
     EXPECT_EQ(makePlan(r).grid, (std::array<int, 3>{64, 64, 64}));
 }
 
+TEST(Plan, WhatWasChosenReproducesAProlatePlan) {
+    // Range and bandwidth, whatever the tolerance of the other Context.
+    for (double radius : {1.0, 0.37})
+        for (double tolerance : {1e-1, 1e-3, 1e-6}) {
+            PlanRequest r = request(CUBE, 300, tolerance);
+            r.radius = radius;
+            const Plan first = makePlan(r);
+            ASSERT_EQ(first.split->name(), "Prolate");
+            r.split = SplitChoice::Prolate;
+            r.overrides = {first.xi,
+                           first.realCutoff,
+                           first.bandwidth,
+                           first.grid,
+                           first.windowSupport,
+                           first.windowShape,
+                           first.lanczosTolerance};
+            for (double other : {tolerance, 1e-2}) {
+                r.tolerance = other;
+                const Plan again = makePlan(r);
+                EXPECT_EQ(again.xi, first.xi);
+                EXPECT_EQ(again.realCutoff, first.realCutoff);
+                EXPECT_EQ(again.bandwidth, first.bandwidth);
+                EXPECT_EQ(again.grid, first.grid);
+                EXPECT_EQ(again.windowSupport, first.windowSupport);
+                EXPECT_EQ(again.windowShape, first.windowShape);
+                for (double k = 0; k < 3; k += 0.01)
+                    EXPECT_EQ(again.split->waveWeight(k), first.split->waveWeight(k));
+                if (other == tolerance) {
+                    EXPECT_EQ(again.predictedError, first.predictedError);
+                    EXPECT_EQ(again.precision, first.precision);
+                }
+            }
+        }
+}
+
+TEST(Plan, ProlateIsTheDefaultWhereItIsValid) {
+    const Plan plan = makePlan(request(CUBE, 300, 1e-3));
+    EXPECT_EQ(plan.split->name(), "Prolate");
+    EXPECT_EQ(plan.splitReason, "default");
+    EXPECT_FALSE(plan.sumImages);
+    EXPECT_LE(plan.realCutoff, 10);
+    EXPECT_EQ(plan.bandwidth * 64, std::round(plan.bandwidth * 64));
+    const auto& split = dynamic_cast<const ProlateSplit&>(*plan.split);
+    EXPECT_TRUE(split.isPositive());
+    EXPECT_EQ(split.range(), plan.realCutoff);
+    for (SplitChoice choice : {SplitChoice::Prolate, SplitChoice::Hasimoto}) {
+        const Plan chosen = makePlan(with(choice, request(CUBE, 300, 1e-3)));
+        EXPECT_EQ(chosen.split->name(), choice == SplitChoice::Prolate ? "Prolate" : "Hasimoto");
+        EXPECT_EQ(chosen.splitReason, "as prescribed");
+        EXPECT_EQ(chosen.bandwidth > 0, choice == SplitChoice::Prolate);
+    }
+    // A prescribed parameter is a range where that is one, and Hasimoto's xi where it is not.
+    PlanRequest r = request(CUBE, 300, 1e-3);
+    r.overrides.xi = 0.2;
+    EXPECT_EQ(makePlan(r).split->name(), "Prolate");
+    EXPECT_EQ(makePlan(r).realCutoff, 5);
+    r.overrides.xi = 0.6;
+    EXPECT_EQ(makePlan(r).split->name(), "Hasimoto");
+    expectMentions(makePlan(r).splitReason, {"because", "1.66667 nm", "positive"});
+    r.overrides.xi = 0;
+    r.overrides.realCutoff = 6;
+    EXPECT_EQ(makePlan(r).split->name(), "Prolate");
+    EXPECT_EQ(makePlan(r).realCutoff, 6);
+    r.overrides.xi = 0.5;
+    EXPECT_EQ(makePlan(r).split->name(), "Hasimoto");
+    expectMentions(makePlan(r).splitReason, {"0.5", "6 nm", "one prolate range"});
+}
+
+TEST(Plan, HasimotoWhereTheBoxIsTooSmall) {
+    for (double L : {4.0, 6.4, 9.0}) {
+        const PlanRequest r = request(Lattice::orthorhombic(L, L, L), 4, 1e-5);
+        const Plan plan = makePlan(r);
+        EXPECT_EQ(plan.split->name(), "Hasimoto");
+        expectMentions(plan.splitReason, {"because", "range of at least", "smallest box width"});
+        expectMentions(refusal(with(SplitChoice::Prolate, r)),
+                       {"range of at least", "smallest box width", "larger box", "looser tolerance",
+                        "setSplit(AutomaticSplit)", "Hasimoto"});
+    }
+    // The same box serves a looser tolerance.
+    EXPECT_EQ(makePlan(request(Lattice::orthorhombic(9, 9, 9), 4, 1e-2)).split->name(), "Prolate");
+}
+
+TEST(Plan, HasimotoWhereTheModelFindsItCheaper) {
+    // Very dense and tight: positivity wants a wider prolate range than the cost does.
+    const double L = std::cbrt(4 * M_PI / 3 * 16000 / 0.4);
+    const PlanRequest r = request(Lattice::orthorhombic(L, L, L), 16000, 1e-10);
+    const Plan plan = makePlan(r), prolate = makePlan(with(SplitChoice::Prolate, r));
+    EXPECT_EQ(plan.split->name(), "Hasimoto");
+    expectMentions(plan.splitReason, {"because", "cost model", "cheaper"});
+    EXPECT_LE(prolate.predictedError, 1e-10);
+    const auto price = [](const Plan& p) {
+        const double range = p.realCutoff;
+        return CostModel::step(16000, p.gridPoints(), p.windowSupport,
+                               16000 * 0.4 * range * range * range, 12);
+    };
+    EXPECT_LT(price(plan), 0.96 * price(prolate));
+}
+
+TEST(Plan, ProlateRefusalsNameTheValueAndTheRemedy) {
+    PlanRequest r = with(SplitChoice::Prolate, request(CUBE, 300, 1e-3));
+    r.overrides.xi = 0.5; // range 2
+    expectMentions(refusal(r), {"2 nm", "below", "0.001", "smaller splitting parameter"});
+    r.overrides.xi = 0.08; // range 12.5 in a box of 20
+    expectMentions(refusal(r), {"12.5 nm", "0.499", "20 nm", "larger splitting parameter"});
+    r.overrides.xi = 0.25;
+    r.overrides.bandwidth = 14; // first zero at 3.6
+    expectMentions(refusal(r), {"bandwidth of 14", "negative", "prolateBandwidth 0"});
+    r.overrides.bandwidth = 3; // drops far too much
+    expectMentions(refusal(r), {"bandwidth of 3", "larger", "0.001"});
+    r.overrides.bandwidth = 9;
+    r.overrides.windowSupport = 3;
+    r.tolerance = 1e-2;
+    EXPECT_EQ(refusal(r), "");
+    r.overrides.bandwidth = 12;
+    r.tolerance = 1e-4;
+    r.overrides.windowSupport = 3;
+    r.overrides.xi = 0.2;
+    expectMentions(refusal(r), {"support 3", "0.0001", "larger support", "another split"});
+    r = with(SplitChoice::Prolate, request(CUBE, 300, 1e-3));
+    r.overrides.xi = 0.25;
+    r.overrides.realCutoff = 4.1;
+    expectMentions(refusal(r), {"0.25", "4.1 nm", "one prolate range"});
+}
+
+TEST(Plan, ProlateSavesGridPointsAtEqualRange) {
+    // Hasimoto's smallest grid over xi against the prolate one, same range; the issue asks 1.6-2.3
+    // at 1e-3, 2.4-5.8 at 1e-4, 2.4-4.2 at 1e-6. Grids are sizes of the FFT: a large box makes
+    // their rounding small (8 % in points), and that much is granted.
+    const double L = 100, margin = 0.92;
+    const Lattice box = Lattice::orthorhombic(L, L, L);
+    const int n = static_cast<int>(0.1 * L * L * L / (4 * M_PI / 3));
+    struct Row {
+        double tolerance, range, saved;
+    };
+    for (const Row& row : {Row{1e-3, 4, 1.6}, Row{1e-3, 5, 1.6}, Row{1e-4, 5, 2.4},
+                           Row{1e-4, 6, 2.4}, Row{1e-6, 6, 2.4}, Row{1e-6, 8, 2.4}}) {
+        PlanRequest r = with(SplitChoice::Prolate, request(box, n, row.tolerance));
+        r.overrides.realCutoff = row.range;
+        r.overrides.windowSupport = static_cast<int>(std::lround(2 - std::log10(row.tolerance)));
+        const Plan prolate = makePlan(r);
+        r.split = SplitChoice::Hasimoto;
+        double fewest = std::numeric_limits<double>::infinity();
+        for (double xi = 2.4 / row.range; xi < 5 / row.range; xi *= 1.05) {
+            r.overrides.xi = xi;
+            const Plan plan = makePlan(r);
+            if (plan.predictedError <= row.tolerance)
+                fewest = std::min(fewest, plan.gridPoints());
+        }
+        EXPECT_GE(fewest / prolate.gridPoints(), margin * row.saved)
+            << row.tolerance << " " << row.range;
+    }
+}
+
 TEST(Plan, LengthsScaleAndNothingElseMatters) {
     PlanRequest r = request(CUBE, 500, 1e-3);
     const Plan first = makePlan(r), second = makePlan(r);
+    EXPECT_EQ(first.bandwidth, second.bandwidth);
+    EXPECT_EQ(first.splitReason, second.splitReason);
     EXPECT_EQ(first.xi, second.xi);
     EXPECT_EQ(first.realCutoff, second.realCutoff);
     EXPECT_EQ(first.grid, second.grid);

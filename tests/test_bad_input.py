@@ -124,7 +124,8 @@ def testNumericalParameters():
     good = {"xi": 1.0, "gridDimensions": (16, 16, 16), "windowSupport": 5, "realCutoff": 2.0}
     for key, value in (("xi", -1.0), ("gridDimensions", (16, 0, 16)), ("windowSupport", 40),
                        ("realCutoff", -2.0), ("windowShape", NAN), ("lanczosTolerance", 2.0),
-                       ("split", "Ewald")):
+                       ("split", "Ewald"), ("prolateBandwidth", 2.9), ("prolateBandwidth", 30.1),
+                       ("prolateBandwidth", NAN)):
         messageOf(integrator.setNumericalParameters, {**good, key: value})
         assert integrator.getSplittingParameter()._value == 0 and integrator.getWindowSupport() == 0
         assert tuple(integrator.getGridDimensions()) == (0, 0, 0)
@@ -216,13 +217,52 @@ def addConstraint(system):
     (lambda i: i.setShearRate(0.25), ["setShearRate", "0.25", "0"]),
     (lambda i: i.setMobilityModel(PSEBrownianIntegrator.ForceCoupling),
      ["setMobilityModel", "ForceCoupling", "RotnePragerYamakawa"]),
-    (lambda i: i.setSplit(PSEBrownianIntegrator.Prolate), ["setSplit", "Prolate", "Hasimoto"]),
     (lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Unbounded),
      ["setFluidBoundary", "Unbounded", "Periodic"]),
     (lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Automatic),
      ["Automatic", "no Force uses periodic", "setFluidBoundary(Periodic)"])])
 def testSettingsOfLaterVersions(platformName, configure, words):
     assertMentions(refusal(platformName, configure), "PSEBrownianIntegrator", *words)
+
+
+@pytest.mark.parametrize("parameters, words", [
+    ({"xi": 1.0}, ["range of 1 nm", "below", "1.7", "tolerance 0.001", "smaller splitting"]),
+    ({"realCutoff": 1.1}, ["range of 1.1 nm", "below", "looser tolerance"]),
+    ({"xi": 0.01}, ["range of 100 nm", "0.499", "smallest box width", "larger box"]),
+    ({"xi": 0.5, "realCutoff": 2.1}, ["0.5 /nm", "2.1 nm", "not those of one prolate range"]),
+    ({"xi": 0.5, "prolateBandwidth": 29.0}, ["bandwidth of 29", "negative", "prolateBandwidth 0"]),
+    ({"xi": 0.45, "prolateBandwidth": 3.0}, ["bandwidth of 3", "error", "larger bandwidth"])])
+def testProlateSplitWhereItIsNotValid(platformName, parameters, words):
+    """The value, the limit and the remedy; and without setSplit the other split takes over."""
+    s = scenes.randomSuspension(30, 0.1, scenes.cube(1), 0.5, 75)
+
+    def configure(i, split):
+        i.setNumericalParameters(parameters)
+        i.setSplit(split)
+    message = messageOf(lambda: makeContext(s, platformName, configure=lambda i: configure(
+        i, PSEBrownianIntegrator.Prolate)))
+    assertMentions(message, "PSEBrownianIntegrator", *words, "AutomaticSplit", "Hasimoto")
+    if parameters.get("xi") == 0.01:
+        return
+    context, integrator = makeContext(s, platformName, configure=lambda i: configure(
+        i, PSEBrownianIntegrator.AutomaticSplit))
+    assert integrator.getNumericalParameters()["split"] == "Hasimoto"
+    assertMentions(integrator.describe(), "Hasimoto split, because", *words[:1])
+
+
+def testProlateSplitInABoxTooSmallForIt(platformName):
+    s = scenes.Scene(np.zeros((1, 3)), scenes.cube(3.0), 0.5)
+    message = messageOf(lambda: makeContext(
+        s, platformName, tolerance=1e-6,
+        configure=lambda i: i.setSplit(PSEBrownianIntegrator.Prolate)))
+    assertMentions(message, "1e-06", "range of at least", "0.499", "3 nm", "larger box")
+
+
+def testBandwidthOfAnotherSplit():
+    integrator = makeIntegrator()
+    message = messageOf(integrator.setNumericalParameters,
+                        {"split": "Hasimoto", "prolateBandwidth": 9.0})
+    assertMentions(message, "prolateBandwidth", "Hasimoto", "Prolate")
 
 
 @pytest.mark.parametrize("force", [

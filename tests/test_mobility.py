@@ -24,8 +24,10 @@ SINGLE = [1e-2, 1e-3, 1e-4, 1e-5]
 TOLERANCES = {"Reference": [1e-2, 1e-3, 1e-5, 1e-10], "CPU": SINGLE + [1e-6, 1e-8]}
 # Rounding of the arrays in use, relative to 1/(6 pi eta a): what exact identities may lose.
 ROUNDING = {"single": 5e-6, "double": 1e-11}
+SPLITS = {"automatic": PSEBrownianIntegrator.AutomaticSplit,
+          "Prolate": PSEBrownianIntegrator.Prolate, "Hasimoto": PSEBrownianIntegrator.Hasimoto}
 PARAMETER_KEYS = {
-    "split", "xi", "realCutoff", "gridDimensions", "windowSupport", "windowShape",
+    "split", "xi", "realCutoff", "prolateBandwidth", "gridDimensions", "windowSupport", "windowShape",
     "lanczosTolerance", "lanczosIterations", "predictedError", "precision", "randomSeed"}
 
 
@@ -80,6 +82,13 @@ def smallScene(seed=51, N=12, phi=0.15, box=scenes.cube(1)):
     return scenes.randomSuspension(N, phi, box, 0.5, seed)
 
 
+def withSplit(split, configure=lambda integrator: None):
+    def both(integrator):
+        integrator.setSplit(SPLITS[split])
+        configure(integrator)
+    return both
+
+
 def rounding(integrator):
     return ROUNDING[integrator.getNumericalParameters()["precision"]]
 
@@ -87,11 +96,13 @@ def rounding(integrator):
 # ---------------------------------------------------------------- the contract
 
 @pytest.mark.parametrize("name", SCENES)
-def testErrorContract(platformName, name):
+@pytest.mark.parametrize("split", ["automatic", "Hasimoto"])
+def testErrorContract(platformName, name, split):
     s = sceneFor(name, platformName)
     failures = []
     for tolerance in TOLERANCES[platformName]:
-        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                          configure=withSplit(split))
         for kind, forces in forceKinds(s).items():
             ratio = errorOf(integrator, forces, s)/tolerance
             if not ratio <= 1:
@@ -108,8 +119,16 @@ def testParametersReported(platformName, name):
         parameters = integrator.getNumericalParameters()
         assert PARAMETER_KEYS <= set(parameters)
         assert 0 < parameters["predictedError"] <= tolerance
-        assert parameters["split"] == "Hasimoto"
         assert parameters["xi"] > 0 and parameters["realCutoff"] > 0
+        prolate = parameters["split"] == "Prolate"
+        assert prolate or parameters["split"] == "Hasimoto"
+        assert prolate or parameters["prolateBandwidth"] == 0
+        if prolate:
+            assert 3 <= parameters["prolateBandwidth"] <= 30
+            assert parameters["xi"]*parameters["realCutoff"] == pytest.approx(1, rel=1e-12)
+            assert parameters["realCutoff"] < 0.5*np.diag(s.box).min()
+        if name != "oneInCube" and tolerance >= 1e-3:
+            assert prolate  # there is room for its range
         assert len(parameters["gridDimensions"]) == 3
         assert min(parameters["gridDimensions"]) >= parameters["windowSupport"] >= 3
         assert parameters["randomSeed"] == 5
@@ -118,13 +137,15 @@ def testParametersReported(platformName, name):
 
 
 @pytest.mark.parametrize("box", ["cube", "tilted", "elongated"])
-def testWorstForce(platformName, box):
+@pytest.mark.parametrize("split", ["automatic", "Hasimoto"])
+def testWorstForce(platformName, box, split):
     """The whole error matrix; no force can find more than its largest singular value."""
     shapes = {"cube": scenes.cube, "tilted": scenes.tilted, "elongated": scenes.elongated}
     s = smallScene(52, 16, 0.15, shapes[box](1))
     failures = []
     for tolerance in TOLERANCES[platformName]:
-        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                          configure=withSplit(split))
         error = mobilityColumns(integrator, s.count) - s.mobility
         worst = np.linalg.norm(error, 2)/s.mu0/tolerance
         if not worst <= 3:
@@ -132,15 +153,17 @@ def testWorstForce(platformName, box):
     assert not failures, "; ".join(failures)
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
-def testSymmetryAndPositivity(platformName, tolerance):
+@pytest.mark.parametrize("tolerance, split", [(1e-2, "Prolate"), (1e-2, "Hasimoto"),
+                                              (1e-5, "Hasimoto")])
+def testSymmetryAndPositivity(platformName, tolerance, split):
     """Overlapping, touching and coincident particles included: M' is symmetric and >= 0."""
     a = 0.5
     s = scenes.idealGas(10, 0.3, scenes.tilted(1), a, 53)
     s.positions[1] = s.positions[0]
     s.positions[3] = s.positions[2] + [0.5*a, 0, 0]
     s.positions[5] = s.positions[4] + [0, 2*a, 0]
-    context, integrator = makeContext(s, platformName, tolerance=tolerance)
+    context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                      configure=withSplit(split))
     M = mobilityColumns(integrator, s.count)/s.mu0
     limit = rounding(integrator)
     assert np.linalg.norm(M - M.T, 2) < limit
@@ -152,15 +175,21 @@ def testSymmetryAndPositivity(platformName, tolerance):
 # ---------------------------------------------------------------- numerical parameters
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
-def testSplittingParameterDoesNotMatter(platformName, tolerance):
+@pytest.mark.parametrize("split", ["automatic", "Prolate", "Hasimoto"])
+def testSplittingParameterDoesNotMatter(platformName, split, tolerance):
     s = scenes.idealGas(30, 0.1, scenes.tilted(1), 0.5, 54)
     forces = randomForces(s)
     exact = s.velocities(forces)
-    for xi in (0.6, 1.0, 1.7, 2.6):
-        context, integrator = makeContext(s, platformName, tolerance=tolerance,
-                                          configure=lambda i: i.setSplittingParameter(xi))
+    # ranges of the prolate split: wide enough to be positive, up to half of the box of 5.4 nm
+    values = {1e-3: (0.375, 0.45, 0.52), 1e-5: (0.375,)}[tolerance] if split == "Prolate" else (
+        0.6, 1.0, 1.7, 2.6)
+    for xi in values:
+        context, integrator = makeContext(
+            s, platformName, tolerance=tolerance,
+            configure=withSplit(split, lambda i: i.setSplittingParameter(xi)))
         parameters = integrator.getNumericalParameters()
         assert parameters["xi"] == pytest.approx(xi, rel=1e-12)
+        assert split == "automatic" or parameters["split"] == split
         ratio = errorRatio(integrator.applyMobility(forces), exact, forces, s)/tolerance
         assert ratio <= 1, f"xi = {xi}: error {ratio:.2f} tolerance, {parameters}"
 
@@ -196,13 +225,61 @@ def testWiderWindow(platformName):
     assert errorOf(integrator, forces, s) <= tolerance
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
-def testPlanIsReproduced(platformName, tolerance):
+@pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
+def testBothSplitsGiveOneMobility(platformName, split):
+    """And the dict of one Context makes it in another, whatever the tolerance that one has."""
+    s = smallScene(74, 30, 0.05, scenes.tilted(1))
+    forces = randomForces(s)
+    exact = s.velocities(forces)
+    for tolerance in (1e-1, 1e-2, 1e-4):
+        context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                          configure=withSplit(split))
+        parameters = integrator.getNumericalParameters()
+        assert parameters["split"] == split
+        u = integrator.applyMobility(forces)
+        assert errorRatio(u, exact, forces, s) <= tolerance
+        other, copy = makeContext(s, platformName, tolerance=3e-3,
+                                  configure=lambda i: i.setNumericalParameters(parameters))
+        found = copy.getNumericalParameters()
+        for key in ("split", "xi", "realCutoff", "prolateBandwidth", "gridDimensions",
+                    "windowSupport", "windowShape"):
+            assert found[key] == parameters[key], key
+        # The modes are the same; tables and window polynomials follow the tolerance.
+        assert errorRatio(copy.applyMobility(forces), u, forces, s) <= 0.1*max(tolerance, 3e-3)
+
+
+def testWhichSplit(platformName):
+    """Prolate is the default; a box too small for it gets the other one, and describe() says so."""
+    wide, narrow = smallScene(75, 40, 0.1), scenes.pair(1.2, 5.0, 0.5)
+    for s, tolerance, name, words in ((wide, 1e-3, "Prolate", "Prolate split (default)"),
+                                      (narrow, 1e-5, "Hasimoto", "Hasimoto split, because")):
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        assert integrator.getNumericalParameters()["split"] == name
+        assert words in integrator.describe()
+        context, integrator = makeContext(s, platformName, tolerance=tolerance,
+                                          configure=withSplit("Hasimoto"))
+        assert "Hasimoto split (as prescribed)" in integrator.describe()
+    context, integrator = makeContext(narrow, platformName, tolerance=1e-5)
+    assert "smallest box width 5 nm" in integrator.describe()
+    context, integrator = makeContext(wide, platformName)
+    context.setPeriodicBoxVectors(*scenes.cube(2.3))    # and back: the Plan follows the box
+    integrator.applyMobility(np.ones((40, 3)))
+    assert integrator.getNumericalParameters()["split"] == "Hasimoto"
+    context.setPeriodicBoxVectors(*wide.box)
+    integrator.applyMobility(np.ones((40, 3)))
+    assert integrator.getNumericalParameters()["split"] == "Prolate"
+
+
+@pytest.mark.parametrize("split, tolerance", [("Prolate", 1e-3), ("Prolate", 1e-2),
+                                              ("Hasimoto", 1e-3), ("Hasimoto", 1e-6)])
+def testPlanIsReproduced(platformName, split, tolerance):
     """The returned dict, given to another integrator: the same dict and velocities, to the bit."""
     s = smallScene(57, 20, 0.1, scenes.tilted(1))
     forces = randomForces(s)
-    context, integrator = makeContext(s, platformName, tolerance=tolerance, seed=17,
-                                      configure=lambda i: i.setSplittingParameter(1.3))
+    xi = 1.3 if split == "Hasimoto" else 0.47
+    context, integrator = makeContext(
+        s, platformName, tolerance=tolerance, seed=17,
+        configure=withSplit(split, lambda i: i.setSplittingParameter(xi)))
     parameters = integrator.getNumericalParameters()
     again, copy = makeContext(s, platformName, tolerance=tolerance, seed=0,
                               configure=lambda i: i.setNumericalParameters(parameters))
@@ -210,16 +287,18 @@ def testPlanIsReproduced(platformName, tolerance):
     assert np.array_equal(copy.applyMobility(forces), integrator.applyMobility(forces))
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
-def testPlatformsAgreeWithTheSamePlan(tolerance):
+@pytest.mark.parametrize("split, tolerance", [("Prolate", 1e-2), ("Prolate", 1e-4),
+                                              ("Hasimoto", 1e-2), ("Hasimoto", 1e-6)])
+def testPlatformsAgreeWithTheSamePlan(split, tolerance):
     s = smallScene(58, 30, 0.1, scenes.tilted(1))
     forces = randomForces(s)
-    context, cpu = makeContext(s, "CPU", tolerance=tolerance)
+    context, cpu = makeContext(s, "CPU", tolerance=tolerance, configure=withSplit(split))
     parameters = cpu.getNumericalParameters()
     other, reference = makeContext(s, "Reference", tolerance=tolerance,
                                    configure=lambda i: i.setNumericalParameters(parameters))
     # The Reference platform converges its Lanczos iteration to 1e-12 whatever it is told.
-    same = ("split", "xi", "realCutoff", "gridDimensions", "windowSupport", "windowShape")
+    same = ("split", "xi", "realCutoff", "prolateBandwidth", "gridDimensions", "windowSupport",
+            "windowShape")
     found = reference.getNumericalParameters()
     assert {key: found[key] for key in same} == {key: parameters[key] for key in same}
     u = reference.applyMobility(forces)

@@ -60,10 +60,12 @@ def suspension(seed=101, N=8, box=scenes.tilted(1)):
 
 # ---------------------------------------------------------------- covariance
 
-@pytest.mark.parametrize("name, xi", [("touching", 0), ("overlapping", 0.8), ("overlapping", 2.0),
-                                      ("suspension", 0), ("suspension", 0.7), ("suspension", 1.6),
-                                      ("elongated", 0), ("idealGas", 0)])
-def testCovarianceIsThatOfTheMobility(platformName, name, xi):
+@pytest.mark.parametrize("name, xi, split", [
+    ("touching", 0, "automatic"), ("overlapping", 0.8, "Hasimoto"), ("overlapping", 2.0, "Hasimoto"),
+    ("suspension", 0, "automatic"), ("suspension", 0.7, "Hasimoto"), ("suspension", 1.6, "Hasimoto"),
+    ("elongated", 0, "automatic"), ("idealGas", 0, "automatic"),
+    ("suspension", 0, "Prolate"), ("overlapping", 0, "Prolate"), ("idealGas", 0, "Prolate")])
+def testCovarianceIsThatOfTheMobility(platformName, name, xi, split):
     """
     n = 5000, d = 6 to 24: variances wrong by 4 % (6 particles: 2.2 %) are found, and correlations
     of 0.1. A correlation between the two halves would add to the covariance, by up to the geometric
@@ -74,10 +76,18 @@ def testCovarianceIsThatOfTheMobility(platformName, name, xi):
          "suspension": suspension,
          "elongated": lambda: suspension(102, 8, scenes.elongated(1)),
          "idealGas": lambda: scenes.idealGas(6, 0.1, scenes.cube(1), 0.5, 103)}[name]()
-    context, integrator = makeContext(s, platformName, T, DT, 1e-4,
-                                      configure=lambda i: i.setSplittingParameter(xi))
+
+    def configure(i):
+        i.setSplittingParameter(xi)
+        i.setSplit({"automatic": PSEBrownianIntegrator.AutomaticSplit,
+                    "Prolate": PSEBrownianIntegrator.Prolate,
+                    "Hasimoto": PSEBrownianIntegrator.Hasimoto}[split])
+    # Boxes of a few radii have room for the prolate split at loose tolerances only; 1e-2 in M is
+    # far below what 5000 samples resolve.
+    context, integrator = makeContext(s, platformName, T, DT, 1e-2 if split == "Prolate" else 1e-4,
+                                      configure=configure)
     y = whiten(samplesOf(integrator, 5000), VARIANCE*s.mobility)
-    assertUnitCovariance(y, f"{name}, xi = {xi}")
+    assertUnitCovariance(y, f"{name}, xi = {xi}, {split}")
     assertZeroMean(y, name)
 
 
@@ -105,7 +115,8 @@ def testNyquistAndConjugatePlanes(platformName, shape, grid):
     assertUnitCovariance(y, f"grid {grid}", tests=5)
 
 
-def testRealAndWaveHalfAreIndependent(platformName):
+@pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
+def testRealAndWaveHalfAreIndependent(platformName, split):
     """
     The halves taken apart through the public API: with odd numbers of modes, the average over all
     translations of the scene by grid points, same seed and so same random numbers, removes every
@@ -119,9 +130,9 @@ def testRealAndWaveHalfAreIndependent(platformName):
     s = scenes.Scene(np.array([[0.2, 0.5, 0.7], [1.1, 0.9, 1.9]]), scenes.cube(3.0), 0.5)
 
     def configure(i):
-        i.setSplittingParameter(1.4)
-        i.setGridDimensions(*grid)
-        i.setWindowSupport(3)
+        i.setNumericalParameters({
+            "split": split, "gridDimensions": grid, "windowSupport": 3,
+            **({"xi": 1.4} if split == "Hasimoto" else {"xi": 0.7, "prolateBandwidth": 5.0})})
     real = 0
     for shift in itertools.product(*(range(g) for g in grid)):
         moved = s.moved((np.array(shift)/grid) @ s.box)

@@ -40,6 +40,7 @@ KEYS = {
     "split",
     "xi",
     "realCutoff",
+    "prolateBandwidth",
     "gridDimensions",
     "windowSupport",
     "windowShape",
@@ -320,7 +321,7 @@ def testNumericalParametersOfAContext(platformName):
         "randomSeed": int,
     }
     assert all(type(value) is types.get(key, float) for key, value in parameters.items())
-    assert parameters["split"] == "Hasimoto" and parameters["randomSeed"] == 11
+    assert parameters["split"] in ("Prolate", "Hasimoto") and parameters["randomSeed"] == 11
     assert (
         parameters["xi"] > 0
         and parameters["realCutoff"] > 0
@@ -358,6 +359,9 @@ def testRequestedNumericalParameters():
     )
     assert integrator.getSplit() == PSEBrownianIntegrator.Hasimoto
     assert integrator.getRandomNumberSeed() == 3
+    integrator.setNumericalParameters({"split": "Prolate", "prolateBandwidth": 9.5})
+    assert integrator.getRequestedNumericalParameters()["prolateBandwidth"] == 9.5
+    assert integrator.getSplit() == PSEBrownianIntegrator.Prolate
 
 
 @pytest.mark.parametrize(
@@ -371,6 +375,8 @@ def testRequestedNumericalParameters():
         ([1, 2], TypeError, "dict"),
         (None, TypeError, "dict"),
         ({"split": "Ewald"}, openmm.OpenMMException, "Ewald"),
+        ({"prolateBandwidth": "9"}, TypeError, "prolateBandwidth"),
+        ({"prolateBandwidth": -9.5}, openmm.OpenMMException, "-9.5"),
         ({"xi": -3.5}, openmm.OpenMMException, "-3.5"),
         ({"xi": 2.0, "realCutoff": -0.5}, openmm.OpenMMException, "-0.5"),
         ({"xi": 2.0, "lanczosTolerance": 7.5}, openmm.OpenMMException, "7.5"),

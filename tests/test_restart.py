@@ -48,15 +48,16 @@ def assertSameState(first, second):
 
 # ---------------------------------------------------------------- checkpoints
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+@pytest.mark.parametrize("tolerance, split", [(1e-3, "Prolate"), (1e-6, "Hasimoto")])
 @pytest.mark.parametrize("before", [0, 1, 13])
-def testCheckpointContinuesToTheBit(platformName, tolerance, before):
+def testCheckpointContinuesToTheBit(platformName, tolerance, split, before):
     """
     In a Context of its own, in the same one after other steps, and after long runs: displacements
     of a radius in between, so that neighbour lists and iteration counts are not those of a fresh
     start.
     """
     context, integrator = bondedContext(platformName, tolerance=tolerance)
+    assert integrator.getNumericalParameters()["split"] == split  # what this box has room for
     run(context, integrator, before)
     checkpoint = context.createCheckpoint()
     at = stateOf(context)
@@ -147,10 +148,13 @@ def testFreeDrainingCheckpoint(platformName):
 
 # ---------------------------------------------------------------- checkpoints of something else
 
-@pytest.mark.parametrize("what", ["tolerance", "xi", "grid", "window", "model", "viscosity", "radius"])
+@pytest.mark.parametrize("what", ["tolerance", "split", "bandwidth", "xi", "grid", "window", "model",
+                                  "viscosity", "radius"])
 def testCheckpointOfAnotherPlanIsRefused(platformName, what):
     """The message names what differs; seed, counters and noise of the Context stay its own."""
     configure = {"tolerance": None,
+                 "split": lambda i: i.setSplit(PSEBrownianIntegrator.Hasimoto),
+                 "bandwidth": lambda i: i.setNumericalParameters({"prolateBandwidth": 9.75}),
                  "xi": lambda i: i.setSplittingParameter(1.11),
                  "grid": lambda i: i.setGridDimensions(20, 20, 20),
                  "window": lambda i: i.setWindowSupport(7),
@@ -264,21 +268,26 @@ def testStateDoesNotRepeatTheNoise(platformName, tmp_path):
             assert np.sum(x*y) < 0.7*np.linalg.norm(x)*np.linalg.norm(y)
 
 
-@pytest.mark.parametrize("way", ["xml", "deepcopy", "pickle"])
-def testCopiesOfAnIntegrator(platformName, way):
+@pytest.mark.parametrize("way, split", [("xml", "Hasimoto"), ("deepcopy", "Hasimoto"),
+                                        ("pickle", "Hasimoto"), ("xml", "Prolate")])
+def testCopiesOfAnIntegrator(platformName, way, split):
     """Every setting survives, and the copy makes the same steps as the original."""
     s = suspension()
 
     def configure(i):
-        i.setSplittingParameter(1.2)
+        if split == "Prolate":
+            i.setNumericalParameters({"split": split, "xi": 0.45, "prolateBandwidth": 11.3})
+        else:
+            i.setSplittingParameter(1.2)
+            i.setSplit(PSEBrownianIntegrator.Hasimoto)
         i.setGridDimensions(14, 15, 16)
         i.setWindowSupport(6)
         i.setParticleRadius(3, 0.5)
-        i.setSplit(PSEBrownianIntegrator.Hasimoto)
         i.setIntegrationForceGroups({0, 2})
 
-    context, integrator = bondedContext(platformName, s, seed=34, tolerance=1e-4,
+    context, integrator = bondedContext(platformName, s, seed=34, tolerance=1e-3,
                                         configure=configure)
+    assert integrator.getNumericalParameters()["split"] == split
     again = {"xml": lambda: PSEBrownianIntegrator.cast(
                  openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(integrator))),
              "deepcopy": lambda: copy.deepcopy(integrator),
@@ -289,6 +298,9 @@ def testCopiesOfAnIntegrator(platformName, way):
                  "WindowSupport", "RandomNumberSeed", "ShearRate", "ParticleRadii",
                  "IntegrationForceGroups"):
         assert getattr(again, "get" + name)() == getattr(integrator, "get" + name)(), name
+    requested = integrator.getRequestedNumericalParameters()
+    assert again.getRequestedNumericalParameters() == requested
+    assert (requested["prolateBandwidth"] == 11.3) == (split == "Prolate")
     other = openmm.Context(context.getSystem(), again, platformNamed(platformName),
                            scenes.platformOptions(platformName, 1))
     other.setPositions(s.positions)

@@ -35,11 +35,19 @@ void describeFluid(std::ostream& out, const PSEBrownianIntegrator& integrator, d
 void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator,
                       const NumericalParameters& p) {
     out << "numerics: tolerance " << integrator.getErrorTolerance() << ", predicted error "
-        << p.predictedError << ", " << p.split << " split, xi = " << p.xi
-        << " /nm, real-space cutoff " << p.realCutoff << " nm, grid " << p.gridDimensions[0]
-        << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
-        << p.windowSupport << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision
-        << " precision" << endl;
+        << p.predictedError << ", xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff
+        << " nm, grid " << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x "
+        << p.gridDimensions[2] << ", window support " << p.windowSupport << ", Lanczos tolerance "
+        << p.lanczosTolerance << ", " << p.precision << " precision" << endl;
+}
+
+void describeSplit(std::ostream& out, const NumericalParameters& p) {
+    const bool clause = p.splitReason.rfind("because", 0) == 0;
+    out << "split: " << p.split << " split" << (clause ? ", " : " (") << p.splitReason
+        << (clause ? "" : ")");
+    if (p.prolateBandwidth > 0)
+        out << ", range 1/xi = " << p.realCutoff << " nm, bandwidth " << p.prolateBandwidth;
+    out << endl;
 }
 
 void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
@@ -82,8 +90,10 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
     out << "particles: " << scene.mobile.size() << " mobile, " << scene.numMassless
         << " massless (they do not move and are transparent to the fluid)" << endl;
     describeFluid(out, integrator, a);
-    if (scene.hydrodynamics)
+    if (scene.hydrodynamics && parameters.split != "none") {
+        describeSplit(out, parameters);
         describeNumerics(out, integrator, parameters);
+    }
     describeStages(out, stages);
     return out.str();
 }

@@ -18,6 +18,7 @@ namespace {
 
 constexpr double SMALLEST_TOLERANCE = 1e-10, LARGEST_TOLERANCE = 1e-1;
 constexpr int SMALLEST_SUPPORT = 3, LARGEST_SUPPORT = 16;
+constexpr double SMALLEST_BANDWIDTH = 3, LARGEST_BANDWIDTH = 30;
 
 [[noreturn]] void refuse(const string& message) {
     throw OpenMMException("PSEBrownianIntegrator: " + message);
@@ -196,6 +197,12 @@ void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& pa
     trial.setWindowSupport(parameters.windowSupport);
     if (parameters.realCutoff != 0)
         requirePositive("realCutoff", parameters.realCutoff, "nm");
+    if (parameters.prolateBandwidth != 0)
+        requireInRange("prolateBandwidth", parameters.prolateBandwidth, SMALLEST_BANDWIDTH,
+                       LARGEST_BANDWIDTH);
+    if (parameters.prolateBandwidth != 0 && parameters.split == "Hasimoto")
+        refuse("prolateBandwidth is not 0, and split is 'Hasimoto', which has none; set it to 0, "
+               "or split to 'Prolate'");
     if (parameters.windowShape != 0)
         requirePositive("windowShape", parameters.windowShape, "");
     if (parameters.lanczosTolerance != 0)
@@ -209,6 +216,7 @@ void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& pa
                "'; it must be 'Hasimoto', 'Prolate', 'none' or empty");
     requested = trial.requested;
     requested.realCutoff = parameters.realCutoff;
+    requested.prolateBandwidth = parameters.prolateBandwidth;
     requested.windowShape = parameters.windowShape;
     requested.lanczosTolerance = parameters.lanczosTolerance;
     if (parameters.randomSeed != 0)

@@ -64,8 +64,6 @@ void checkSettings(const PSEBrownianIntegrator& integrator) {
     if (integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
         refuse("setMobilityModel(ForceCoupling): this mobility is not available; use "
                "RotnePragerYamakawa or FreeDraining");
-    if (integrator.getSplit() == PSEBrownianIntegrator::Prolate)
-        refuse("setSplit(Prolate): this split is not available; use AutomaticSplit or Hasimoto");
 }
 
 void checkBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {

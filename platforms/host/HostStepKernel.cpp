@@ -49,6 +49,17 @@ template <class T> T read(std::istream& stream) {
     return value;
 }
 
+SplitChoice choiceOf(PSEBrownianIntegrator::Split split) {
+    switch (split) {
+    case PSEBrownianIntegrator::Prolate:
+        return SplitChoice::Prolate;
+    case PSEBrownianIntegrator::Hasimoto:
+        return SplitChoice::Hasimoto;
+    default:
+        return SplitChoice::Automatic;
+    }
+}
+
 string readText(std::istream& stream, size_t limit) {
     const uint64_t length = read<uint64_t>(stream);
     if (length > limit)
@@ -91,6 +102,7 @@ void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrato
     PlanOverrides overrides;
     overrides.xi = wish.xi;
     overrides.realCutoff = wish.realCutoff;
+    overrides.bandwidth = wish.prolateBandwidth;
     for (int d = 0; d < 3; d++)
         overrides.grid[d] = wish.gridDimensions[d];
     overrides.windowSupport = wish.windowSupport;
@@ -98,7 +110,8 @@ void HostStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrato
     overrides.lanczosTolerance = wish.lanczosTolerance;
     request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
                                   scene.radii[0], integrator.getErrorTolerance(),
-                                  integrator.getTemperature() > 0, 0, false, overrides});
+                                  integrator.getTemperature() > 0, 0, false, overrides,
+                                  choiceOf(integrator.getSplit())});
     factory->adapt(*request);
     plan(request->box);
 }
@@ -251,6 +264,8 @@ NumericalParameters HostStepKernel::parametersOf(const Plan& plan) const {
     p.split = plan.split->name();
     p.xi = plan.xi;
     p.realCutoff = plan.realCutoff;
+    p.prolateBandwidth = plan.bandwidth;
+    p.splitReason = plan.splitReason;
     for (int d = 0; d < 3; d++)
         p.gridDimensions[d] = plan.grid[d];
     p.windowSupport = plan.windowSupport;
@@ -283,10 +298,11 @@ string HostStepKernel::signature(const Plan& plan) const {
     text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining") << ", viscosity "
          << viscosity << " Da/(nm ps), first radius " << (scene.radii.empty() ? 0 : scene.radii[0])
          << " nm, particles " << scene.mobile.size() << " of " << masses.size() << ", split "
-         << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
-         << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
-         << ", window support " << p.windowSupport << ", window shape " << p.windowShape
-         << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision";
+         << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff
+         << " nm, prolate bandwidth " << p.prolateBandwidth << ", grid " << p.gridDimensions[0]
+         << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
+         << p.windowSupport << ", window shape " << p.windowShape << ", Lanczos tolerance "
+         << p.lanczosTolerance << ", " << p.precision << " precision";
     return text.str();
 }
 

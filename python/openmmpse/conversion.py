@@ -18,6 +18,7 @@ SETTABLE = {
     "split": "",
     "xi": 0.0,
     "realCutoff": 0.0,
+    "prolateBandwidth": 0.0,
     "gridDimensions": (0, 0, 0),
     "windowSupport": 0,
     "windowShape": 0.0,

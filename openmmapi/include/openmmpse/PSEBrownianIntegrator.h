@@ -21,10 +21,12 @@ struct Scene;
  * For a free-draining fluid xi = 0 and the grid is (0, 0, 0).
  */
 struct OPENMM_EXPORT_PSE NumericalParameters {
-    /// name of the real/wave split: "Hasimoto", or "none" without one
+    /// name of the real/wave split: "Prolate" or "Hasimoto", or "none" without one
     std::string split;
-    double xi = 0;                     ///< splitting parameter (in 1/nm)
-    double realCutoff = 0;             ///< range of the real-space half (in nm)
+    double xi = 0;         ///< splitting parameter (in 1/nm); of the prolate split 1/realCutoff
+    double realCutoff = 0; ///< range of the real-space half (in nm)
+    /// bandwidth c of the prolate split, in [3, 30] (dimensionless); 0 for another split
+    double prolateBandwidth = 0;
     int gridDimensions[3] = {0, 0, 0}; ///< grid points along the three box vectors
     int windowSupport = 0;             ///< grid points per axis that one particle touches, P
     double windowShape = 0;            ///< shape beta of the Kaiser-Bessel window (dimensionless)
@@ -36,6 +38,7 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
     std::string precision;
     /// seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
     int randomSeed = 0;
+    std::string splitReason; ///< why this split, in the words of describe() (never set)
 };
 
 /**
@@ -69,8 +72,16 @@ public:
         Periodic = 1, ///< periodic in the box of the Context, zero mean flow
         Unbounded = 2 ///< infinite solvent
     };
-    /** How M is divided into a real-space and a wave-space half. */
-    enum Split : int { AutomaticSplit = 0, Prolate = 1, Hasimoto = 2 };
+    /** How M is divided into a real-space and a wave-space half; none of them shows in M. */
+    enum Split : int {
+        /// Prolate where the box and the tolerance allow it and Hasimoto is not cheaper by the cost
+        /// model
+        AutomaticSplit = 0,
+        /// the real half is exactly zero beyond its range R; needs R between 2.4 radii (more for
+        /// tolerances below 1e-2) and half the smallest width of the box
+        Prolate = 1,
+        Hasimoto = 2 ///< the published one, for every box
+    };
     /**
      * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without
      * noise
@@ -139,13 +150,18 @@ public:
     void setShearRate(double rate);
     /** Get the requested split. */
     Split getSplit() const { return split; }
-    /** Set how M is divided into its real-space and wave-space half; default AutomaticSplit. */
+    /**
+     * Set how M is divided into its real-space and wave-space half; default AutomaticSplit. With
+     * Prolate, a Context in whose box that split is not valid is refused.
+     */
     void setSplit(Split split);
     /** Get the requested splitting parameter (in 1/nm); 0 = automatic. */
     double getSplittingParameter() const { return requested.xi; }
     /**
      * Set the splitting parameter xi (in 1/nm), > 0, or 0 for automatic. It moves cost between the
-     * halves, not the result.
+     * halves, not the result. Its meaning is the split's: for Prolate it is 1/range, for Hasimoto
+     * that of the published formula. AutomaticSplit takes it as 1/range where that is a valid range
+     * of Prolate, else as Hasimoto's.
      */
     void setSplittingParameter(double xi);
     /** Get the requested grid dimensions; 0 = automatic. */

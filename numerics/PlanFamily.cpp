@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+#include "numerics/PlanFamily.h"
+#include "numerics/HasimotoSplit.h"
+#include "numerics/PlanCost.h"
+#include "numerics/Window.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace PSE::numerics {
+
+namespace {
+
+constexpr double BUDGET_PER_HALF = 0.5; ///< share of the tolerance that each half may use
+/// clusters and chains are denser than the box mean
+constexpr double LOCAL_VOLUME_FRACTION = 0.3;
+/// in radii: here sums have few terms, which integrals estimate only roughly
+constexpr double SMALL_BOX = 12;
+constexpr double SMALL_BOX_SHARE = 0.5; ///< of the budget, therefore
+/// Radii. What the window does to waves longer than this is a fixed small share of the velocity
+/// that they carry, which the tolerance is relative to: farther pairs do not count. Not so in long
+/// boxes, where few waves carry most of it.
+constexpr double LARGEST_EXTENT = 12;
+constexpr double LONG_BOX = 2; ///< longest over shortest box vector
+/// refinements of grid and window beyond the rules [T15]
+constexpr int LAST_ATTEMPT = 12;
+constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
+/// predicted error below which single precision would be the larger error, as a share of its floor
+constexpr double SINGLE_SHARE = 0.1;
+constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
+
+/**
+ * Support and grid spacing that keep the error of the wave half, [T15]: digits + 2 points, or one
+ * less on a finer grid.
+ */
+struct WindowChoice {
+    int support;
+    double finer; ///< factor on the Nyquist wave number
+};
+
+double orderedPairs(const PlanRequest& r, double rc, bool sumImages) {
+    const double inRange = meanNeighbours(r.box, r.numParticles, rc);
+    // An explicit sum looks at every pair in every image cell that the range touches.
+    const double touched = r.numParticles * std::pow(1 + 2 * rc / std::cbrt(r.box.volume()), 3);
+    return r.numParticles * (inRange + (sumImages ? 0.5 * touched : 0));
+}
+
+Lattice scaledBox(const PlanRequest& r) {
+    const Matrix3 v = r.box.vectors() / r.radius;
+    return Lattice(v.col(0), v.col(1), v.col(2));
+}
+
+/** Edge of the cube that the particles fill at volume fraction phi, in radii. */
+double extentOf(const PlanRequest& r, double phi) {
+    const double lengths[3] = {r.box.length(0), r.box.length(1), r.box.length(2)};
+    const double shortest = *std::min_element(lengths, lengths + 3),
+                 longest = *std::max_element(lengths, lengths + 3);
+    if (longest > LONG_BOX * shortest)
+        return std::numeric_limits<double>::infinity();
+    return std::min(LARGEST_EXTENT, std::cbrt(4.0 / 3 * M_PI * r.numParticles / phi));
+}
+
+} // namespace
+
+int effectivePoints(int n) {
+    return n % 2 == 0 ? n - 1 : n;
+}
+
+int supportFor(double error) {
+    return std::clamp(static_cast<int>(std::lround(2 - std::log10(error))), 4, 14);
+}
+
+double shapeFor(double error, int support) {
+    return std::max(std::log(10 / error), Window::minShape(support));
+}
+
+double volumeFraction(const PlanRequest& r) {
+    return r.numParticles * 4.0 / 3 * M_PI * r.radius * r.radius * r.radius / r.box.volume();
+}
+
+PlanFamily::PlanFamily(const PlanRequest& request, double share)
+    : request(request), box(scaledBox(request)),
+      error(share * request.tolerance * (box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1)),
+      meanPhi(volumeFraction(request)), phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)),
+      extent(extentOf(request, phi)) {}
+
+double PlanFamily::waveErrorOf(const Plan& plan) const {
+    return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi,
+                     extent);
+}
+
+std::array<int, 3> PlanFamily::gridFor(double nyquist, int support) const {
+    std::array<int, 3> grid;
+    for (int d = 0; d < 3; d++) {
+        // The length of the box vector, not the width of the box, keeps every face of the Nyquist
+        // cell beyond `nyquist`.
+        const double points = std::max(box.length(d) * nyquist / M_PI, double(support));
+        grid[d] = static_cast<int>(std::min(std::ceil(points), 2e9));
+        while (grid[d] <= WIDEST_GRID &&
+               (nextFftSize(grid[d]) != grid[d] || effectivePoints(grid[d]) < points))
+            grid[d]++;
+    }
+    return grid;
+}
+
+double PlanFamily::products() const {
+    return 1 + (request.thermal ? 1 - std::log10(request.tolerance) : 0);
+}
+
+double PlanFamily::realCost(double range) const {
+    return CostModel::step(0, 0, 0, orderedPairs(request, range, false), products());
+}
+
+double PlanFamily::cost(const Plan& plan) const {
+    const double pairs = orderedPairs(request, plan.realCutoff, plan.sumImages);
+    return request.directSums
+               ? CostModel::directStep(request.numParticles, plan.gridPoints(), pairs, products())
+               : CostModel::step(request.numParticles, plan.gridPoints(), plan.windowSupport, pairs,
+                                 products());
+}
+
+void PlanFamily::completeRealHalf(Plan& plan) const {
+    const PlanOverrides& wish = request.overrides;
+    plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE * request.box.smallestWidth();
+    plan.lanczosTolerance =
+        (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5 * request.tolerance);
+    plan.tableError =
+        TABLE_SHARE * request.tolerance * (box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1);
+    const bool single = request.tolerance >= request.singleFloor &&
+                        plan.realCutoff / plan.a <= plan.split->tableRange(true);
+    plan.precision = (single ? Precision::Single : Precision::Double);
+}
+
+double PlanFamily::realErrorOf(const Plan& plan) const {
+    return plan.split->realTruncation(plan.realCutoff / plan.a, phi, meanPhi);
+}
+
+void PlanFamily::predict(Plan& plan, double wave) const {
+    plan.predictedError = std::hypot(wave, realErrorOf(plan));
+    if (plan.predictedError < SINGLE_SHARE * request.singleFloor)
+        plan.precision = Precision::Double;
+}
+
+std::string PlanFamily::windowRefusal(const Plan& plan, double wave) const {
+    std::ostringstream message;
+    message << "a window of support " << plan.windowSupport << " and shape " << plan.windowShape
+            << " leaves an error of " << wave << " on any grid, the tolerance is "
+            << request.tolerance << "; prescribe a larger support, or neither support nor shape";
+    return message.str();
+}
+
+HasimotoPlans::HasimotoPlans(const PlanRequest& request) : PlanFamily(request, BUDGET_PER_HALF) {}
+
+Plan HasimotoPlans::best() const {
+    double cost = 0;
+    Plan best = {};
+    if (request.overrides.xi > 0)
+        best = at(request.overrides.xi * request.radius, cost);
+    else {
+        const double longest =
+            std::max({request.box.length(0), request.box.length(1), request.box.length(2)});
+        // From a range of about the whole box (few particles in a large box) to one below contact.
+        const double first = std::min(0.03, 6 * request.radius / longest), last = 2.0,
+                     factor = 1.12;
+        // A prescribed grid serves only some xi: the cheapest of those, else the one with the
+        // smallest error.
+        const bool gridGiven = (request.overrides.grid[0] > 0);
+        double lowest = std::numeric_limits<double>::infinity();
+        for (double xi = first; xi < last; xi *= factor) {
+            Plan plan = at(xi, cost);
+            if (gridGiven) {
+                checkPlan(plan, request);
+                finish(plan);
+                if (plan.predictedError > request.tolerance)
+                    cost = plan.predictedError * 1e100;
+            }
+            if (cost < lowest) {
+                lowest = cost;
+                best = plan;
+            }
+        }
+    }
+    checkPlan(best, request);
+    finish(best);
+    checkPlan(best, request);
+    return best;
+}
+
+Plan HasimotoPlans::at(double xi, double& cost) const {
+    const PlanOverrides& wish = request.overrides;
+    Plan plan = {};
+    plan.split = std::make_shared<HasimotoSplit>(xi);
+    plan.a = request.radius;
+    plan.xi = (wish.xi > 0 ? wish.xi : xi / plan.a);
+    plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff
+                                           : plan.a * plan.split->realCutoff(error, phi, meanPhi));
+    // little is left beyond, and counted
+    plan.realCutoff = std::min(plan.realCutoff, plan.a * plan.split->tableRange(false));
+    completeRealHalf(plan);
+    chooseWindow(plan, cost);
+    if (realErrorOf(plan) > 1.01 * error) // its range was cut
+        cost *= UNAFFORDABLE;
+    return plan;
+}
+
+void HasimotoPlans::chooseWindow(Plan& plan, double& lowest) const {
+    const PlanOverrides& wish = request.overrides;
+    const double nyquist = plan.split->waveCutoff(error, phi);
+    const int digits = supportFor(error);
+    lowest = std::numeric_limits<double>::infinity();
+    for (const WindowChoice& choice :
+         {WindowChoice{digits, 1.0}, WindowChoice{digits - 1, digits <= 6 ? 1.24 : 1.14}}) {
+        Plan candidate = plan;
+        candidate.windowSupport = (wish.windowSupport > 0 ? wish.windowSupport : choice.support);
+        candidate.grid = gridFor(nyquist * choice.finer, candidate.windowSupport);
+        if (wish.grid[0] > 0) {
+            const std::array<int, 3>& needed = candidate.grid;
+            const bool fineEnough =
+                wish.grid[0] >= needed[0] && wish.grid[1] >= needed[1] && wish.grid[2] >= needed[2];
+            if (choice.finer > 1 && !fineEnough)
+                continue; // the smaller support needs its finer grid
+            candidate.grid = wish.grid;
+        }
+        const double estimate = cost(candidate);
+        if (estimate < lowest) {
+            lowest = estimate;
+            plan = candidate;
+        }
+    }
+    plan.windowShape =
+        (wish.windowShape > 0 ? wish.windowShape : shapeFor(error, plan.windowSupport));
+}
+
+void HasimotoPlans::finish(Plan& plan) const {
+    const PlanOverrides& wish = request.overrides;
+    const bool freeGrid = (wish.grid[0] == 0),
+               freeWindow = (wish.windowSupport == 0 && wish.windowShape == 0);
+    double wave = waveErrorOf(plan);
+    for (int attempt = 1; freeGrid && wave > error && attempt <= LAST_ATTEMPT; attempt++) {
+        if (freeWindow && attempt % 3 == 0 && plan.windowSupport < LARGEST_SUPPORT) {
+            plan.windowSupport++;
+            plan.windowShape = shapeFor(error, plan.windowSupport);
+        }
+        for (int d = 0; d < 3; d++)
+            plan.grid[d] = nextFftSize(std::max(plan.grid[d] + 1, plan.windowSupport));
+        wave = waveErrorOf(plan);
+    }
+    predict(plan, wave);
+    const double real = realErrorOf(plan);
+    if (wish.realCutoff == 0 && wish.xi == 0 && !(real <= request.tolerance)) {
+        std::ostringstream message;
+        message << "the smallest error that the real half reaches here is " << real
+                << ", the tolerance is " << request.tolerance
+                << "; loosen the tolerance or use a larger box";
+        throw std::invalid_argument(message.str());
+    }
+    if (wish.realCutoff == 0 && !(real <= request.tolerance)) {
+        std::ostringstream message;
+        message << "splitting parameter " << plan.xi << " /nm leaves an error of " << real
+                << " in the real half, the "
+                << "tolerance is " << request.tolerance
+                << "; choose a smaller splitting parameter, or 0 for the automatic one";
+        throw std::invalid_argument(message.str());
+    }
+    if (freeGrid && !(wave <= request.tolerance))
+        throw std::invalid_argument(windowRefusal(plan, wave));
+}
+
+} // namespace PSE::numerics

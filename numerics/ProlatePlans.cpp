@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: MIT
+#include "numerics/PlanFamily.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <sstream>
+
+namespace PSE::numerics {
+
+namespace {
+
+/// of the tolerance for the wave half: all the error there is. Measured errors reach 0.85 of the
+/// estimate for uniform forces.
+constexpr double WAVE_BUDGET = 0.9;
+/// of that for the dropped waves, the rest for the grid: the cheapest division, and a flat optimum
+constexpr double DROPPED_SHARE = 0.6;
+/// bandwidths are multiples of this: the same on machines that round differently
+constexpr double BANDWIDTH_STEP = 1.0 / 64;
+/// from one range to the next: narrow ones, where box and tolerance leave little choice, and wide
+constexpr double FINE_FACTOR = 1.04, FACTOR = 1.12;
+/// radii: here even the tightest tolerance has a valid range
+constexpr double AMPLE_RANGE = 32;
+constexpr int MORE_SUPPORT = 4; ///< than the rule, at most
+/// Nyquist wave numbers in units of c/R between which the grid is sought
+constexpr double COARSEST = 0.9, FINEST = 2.2, GRID_PRECISION = 0.004;
+
+std::shared_ptr<const ProlateSplit> splitOf(double c, double R) {
+    return std::make_shared<const ProlateSplit>(c, R);
+}
+
+/** Whether xi and cut-off, where both are given, are those of one range. */
+bool isOneRange(const PlanOverrides& wish) {
+    return wish.xi == 0 || wish.realCutoff == 0 || std::fabs(wish.xi * wish.realCutoff - 1) < 1e-9;
+}
+
+double largestRange(const PlanRequest& request) {
+    return LARGEST_LIST_RANGE * request.box.smallestWidth();
+}
+
+} // namespace
+
+ProlatePlans::ProlatePlans(const PlanRequest& request) : PlanFamily(request, WAVE_BUDGET) {}
+
+std::optional<double> ProlatePlans::bandwidthFor(double R) const {
+    if (request.overrides.bandwidth > 0)
+        return request.overrides.bandwidth;
+    const auto suffices = [&](double c) {
+        const ProlateSplit split(c, R);
+        // a zero or negative matching term comes with bandwidths that are too large already
+        return split.matching() <= 0 ||
+               split.waveTruncation(split.firstZero(), phi) <= DROPPED_SHARE * error;
+    };
+    int low = static_cast<int>(ProlateSplit::SMALLEST_BANDWIDTH / BANDWIDTH_STEP) - 1,
+        high = static_cast<int>(ProlateSplit::LARGEST_BANDWIDTH / BANDWIDTH_STEP);
+    if (!suffices(high * BANDWIDTH_STEP))
+        return std::nullopt;
+    while (high - low > 1) {
+        const int mid = (low + high) / 2;
+        (suffices(mid * BANDWIDTH_STEP) ? high : low) = mid;
+    }
+    return high * BANDWIDTH_STEP;
+}
+
+bool ProlatePlans::isValid(double R) const {
+    const std::optional<double> c = bandwidthFor(R);
+    return c && ProlateSplit(*c, R).isPositive();
+}
+
+double ProlatePlans::smallestRange() const {
+    double low = ProlateSplit::SMALLEST_RANGE, high = AMPLE_RANGE;
+    if (isValid(low))
+        return low;
+    if (!isValid(high))
+        return std::numeric_limits<double>::infinity();
+    while (high - low > 1e-3 * high) {
+        const double mid = 0.5 * (low + high);
+        (isValid(mid) ? high : low) = mid;
+    }
+    return high;
+}
+
+/** Why a range (radii; 0: a free one) cannot be that of the split, and what would help. */
+std::string ProlatePlans::obstacleTo(double R) const {
+    std::ostringstream message;
+    const double a = request.radius, smallest = a * smallestRange(),
+                 largest = largestRange(request);
+    if (!isOneRange(request.overrides))
+        message << "the prescribed splitting parameter " << request.overrides.xi
+                << " /nm and real-space cutoff " << request.overrides.realCutoff
+                << " nm are not those of one prolate range (xi = 1/cutoff); prescribe one of them";
+    else if (R > 0 && a * R > largest)
+        message << "a prolate range of " << a * R << " nm is more than " << LARGEST_LIST_RANGE
+                << " of the smallest box width " << request.box.smallestWidth()
+                << " nm; use a larger splitting parameter (1/range) or a larger box";
+    else if (request.overrides.bandwidth > 0)
+        message << "a prolate bandwidth of " << request.overrides.bandwidth
+                << " makes the real half negative at every range asked for; leave "
+                   "prolateBandwidth 0 for the automatic one";
+    else if (smallest > largest)
+        message << "at tolerance " << request.tolerance
+                << " the prolate split needs a range of at least " << smallest
+                << " nm, which is more than " << LARGEST_LIST_RANGE << " of the smallest box width "
+                << request.box.smallestWidth() << " nm; use a larger box or a looser tolerance";
+    else
+        message << "a prolate range of " << a * R << " nm is below the " << smallest
+                << " nm that tolerance " << request.tolerance
+                << " needs for a positive real half; use a smaller splitting parameter (1/range) "
+                   "or a looser tolerance";
+    return message.str();
+}
+
+/** What keeps a Plan with a free grid from the tolerance, and what would help; else "". */
+std::string ProlatePlans::missedTolerance(const Plan& plan) const {
+    std::ostringstream message;
+    const double dropped = plan.split->waveTruncation(FINEST * plan.bandwidth, phi);
+    if (request.overrides.grid[0] != 0 || plan.predictedError <= request.tolerance)
+        return "";
+    if (dropped > request.tolerance)
+        message << "a prolate bandwidth of " << plan.bandwidth << " leaves an error of " << dropped
+                << ", the tolerance is " << request.tolerance
+                << "; prescribe a larger bandwidth, or 0 for the automatic one";
+    else
+        message << windowRefusal(plan, plan.predictedError);
+    return message.str();
+}
+
+std::vector<int> ProlatePlans::supports() const {
+    if (request.overrides.windowSupport > 0)
+        return {request.overrides.windowSupport};
+    return {supportFor(error), supportFor(error) - 1};
+}
+
+std::optional<Plan> ProlatePlans::at(double R) const {
+    const std::optional<double> c = bandwidthFor(R);
+    if (!c)
+        return std::nullopt;
+    const PlanOverrides& wish = request.overrides;
+    Plan plan = {};
+    plan.a = request.radius;
+    plan.realCutoff = (wish.realCutoff > 0 ? wish.realCutoff : R * plan.a);
+    plan.xi = (wish.xi > 0 ? wish.xi : 1 / plan.realCutoff);
+    plan.bandwidth = *c;
+    // of the very quotient that the tables are asked for
+    const auto split = splitOf(*c, plan.realCutoff / plan.a);
+    if (!split->isPositive())
+        return std::nullopt;
+    plan.split = split;
+    completeRealHalf(plan);
+    std::optional<Plan> cheapest;
+    for (int support : supports()) {
+        const double digits = -std::log10(error),
+                     finer = (support < supportFor(error) ? 1.3 : 1.03 + 0.008 * digits);
+        plan.windowSupport = support;
+        plan.windowShape = (wish.windowShape > 0 ? wish.windowShape : shapeFor(error, support));
+        plan.grid = (wish.grid[0] > 0 ? wish.grid : gridFor(finer * *c / split->range(), support));
+        if (!cheapest || cost(plan) < cost(*cheapest))
+            cheapest = plan;
+    }
+    return cheapest;
+}
+
+bool ProlatePlans::fitGrid(Plan& plan, double& wave) const {
+    if (request.overrides.grid[0] > 0) {
+        wave = waveErrorOf(plan);
+        return wave <= error;
+    }
+    const double unit = plan.bandwidth * plan.a / plan.realCutoff;
+    const auto evaluate = [&](double nyquist) {
+        plan.grid = gridFor(nyquist * unit, plan.windowSupport);
+        if (*std::max_element(plan.grid.begin(), plan.grid.end()) > WIDEST_GRID)
+            return std::numeric_limits<double>::infinity();
+        return waveErrorOf(plan);
+    };
+    double low = COARSEST, high = FINEST;
+    wave = evaluate(high);
+    if (!(wave <= error))
+        return false;
+    std::array<int, 3> fitting = plan.grid, failing = {0, 0, 0};
+    while (high - low > GRID_PRECISION * high) {
+        const double mid = std::sqrt(low * high);
+        const std::array<int, 3> grid = gridFor(mid * unit, plan.windowSupport);
+        bool fits = (grid == fitting);
+        if (!fits && grid != failing) {
+            const double found = evaluate(mid);
+            fits = (found <= error);
+            (fits ? fitting : failing) = grid;
+            wave = (fits ? found : wave);
+        }
+        (fits ? high : low) = mid;
+    }
+    plan.grid = fitting;
+    return true;
+}
+
+/** The same range and bandwidth with the cheapest window and grid that keep the budget. */
+Plan ProlatePlans::finished(const Plan& plan) const {
+    std::vector<int> candidates = supports();
+    const size_t usual = candidates.size();
+    if (request.overrides.windowSupport == 0 && request.overrides.windowShape == 0)
+        for (int wider = 1; wider <= MORE_SUPPORT; wider++) // for what the usual ones cannot do
+            candidates.push_back(std::min(candidates[0] + wider, LARGEST_SUPPORT));
+    Plan best = plan;
+    double bestWave = std::numeric_limits<double>::infinity();
+    bool fits = false;
+    for (size_t i = 0; i < candidates.size() && !(fits && i >= usual); i++) {
+        Plan candidate = plan;
+        candidate.windowSupport = candidates[i];
+        if (request.overrides.windowShape == 0)
+            candidate.windowShape = shapeFor(error, candidates[i]);
+        double wave = 0;
+        const bool fit = fitGrid(candidate, wave);
+        if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {
+            best = candidate;
+            bestWave = wave;
+        }
+        fits = fits || fit;
+    }
+    predict(best, bestWave);
+    return best;
+}
+
+std::optional<Plan> ProlatePlans::best(std::string& obstacle) const {
+    const PlanOverrides& wish = request.overrides;
+    const double a = request.radius, largest = largestRange(request) / a;
+    const double given =
+        (wish.realCutoff > 0 ? wish.realCutoff / a : (wish.xi > 0 ? 1 / (wish.xi * a) : 0));
+    const double smallest = (given > 0 ? given : smallestRange());
+    std::optional<Plan> best;
+    if (isOneRange(wish) && smallest <= largest) {
+        const bool gridGiven = (wish.grid[0] > 0);
+        double lowest = std::numeric_limits<double>::infinity();
+        for (double R = smallest; R <= largest; R *= R < AMPLE_RANGE ? FINE_FACTOR : FACTOR) {
+            std::optional<Plan> plan = at(R);
+            if (plan) {
+                double price = cost(*plan);
+                if (gridGiven) { // it serves only some ranges; else the smallest error is best
+                    plan = finished(*plan);
+                    price = cost(*plan);
+                    if (plan->predictedError > request.tolerance)
+                        price = plan->predictedError * 1e100;
+                }
+                if (price < lowest) {
+                    lowest = price;
+                    best = plan;
+                }
+            }
+            if (given > 0 || realCost(R * a) > lowest)
+                break;
+        }
+    }
+    obstacle = "";
+    if (!best) {
+        obstacle = obstacleTo(given);
+        return best;
+    }
+    best = finished(*best);
+    obstacle = missedTolerance(*best);
+    return obstacle.empty() ? best : std::nullopt;
+}
+
+} // namespace PSE::numerics
