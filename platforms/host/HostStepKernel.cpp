@@ -138,14 +138,14 @@ void HostStepKernel::followPositions() {
         if (box != request->box)
             plan(box);
     }
-    engine->setPositions(gathered(*data.positions));
+    gather(*data.positions, positions);
+    engine->setPositions(positions);
 }
 
-vector<Vec3> HostStepKernel::gathered(const vector<OmmVec3>& all) const {
-    vector<Vec3> mobile(scene.mobile.size());
+void HostStepKernel::gather(const vector<OmmVec3>& all, vector<Vec3>& mobile) const {
+    mobile.resize(scene.mobile.size());
     for (size_t i = 0; i < mobile.size(); i++)
         mobile[i] = fromOpenMM(all[scene.mobile[i]]);
-    return mobile;
 }
 
 vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double scale) const {
@@ -168,7 +168,7 @@ void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what,
 }
 
 void HostStepKernel::checkPositions(ContextImpl&) {
-    const vector<Vec3> positions = gathered(*data.positions);
+    gather(*data.positions, positions);
     requireFinite(positions, "the position", "nm", "set finite positions");
     const OmmVec3* box = data.periodicBoxVectors;
     const double farthest = FARTHEST * std::max({box[0][0], box[1][1], box[2][2]});
@@ -191,7 +191,7 @@ Thermal HostStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sa
 }
 
 void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& integrator) {
-    const vector<Vec3> forces = gathered(*data.forces);
+    gather(*data.forces, forces);
     requireFinite(forces, "the force", "kJ/(mol nm)",
                   "check the Forces at these positions, or use a smaller step size");
     followPositions();
@@ -201,12 +201,11 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
                   "its force is too large; use a smaller step size");
 
     const double dt = integrator.getStepSize();
-    vector<Vec3> moved = gathered(*data.positions);
     for (size_t i = 0; i < velocities.size(); i++)
-        moved[i] += dt * velocities[i];
-    requireFinite(moved, "the next position", "nm", "use a smaller step size");
-    for (size_t i = 0; i < moved.size(); i++) {
-        (*data.positions)[scene.mobile[i]] = toOpenMM(moved[i]);
+        positions[i] += dt * velocities[i];
+    requireFinite(positions, "the next position", "nm", "use a smaller step size");
+    for (size_t i = 0; i < positions.size(); i++) {
+        (*data.positions)[scene.mobile[i]] = toOpenMM(positions[i]);
         (*data.velocities)[scene.mobile[i]] = toOpenMM(velocities[i]);
     }
     context.computeVirtualSites();
@@ -222,8 +221,9 @@ double HostStepKernel::computeKineticEnergy(ContextImpl&) {
     return energy;
 }
 
-vector<OmmVec3> HostStepKernel::applyMobility(ContextImpl&, const vector<OmmVec3>& forces) {
-    const vector<Vec3> mobile = gathered(forces);
+vector<OmmVec3> HostStepKernel::applyMobility(ContextImpl&, const vector<OmmVec3>& given) {
+    vector<Vec3> mobile;
+    gather(given, mobile);
     requireFinite(mobile, "the given force", "kJ/(mol nm)", "give finite forces");
     const StageClock ofSteps = clock;
     followPositions();

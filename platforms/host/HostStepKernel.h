@@ -43,7 +43,8 @@ private:
     /** @throws OpenMMException naming the first particle whose entry is not finite */
     void requireFinite(const std::vector<numerics::Vec3>& values, const char* what,
                        const char* unit, const char* remedy) const;
-    std::vector<numerics::Vec3> gathered(const std::vector<OpenMM::Vec3>& all) const;
+    /** The entries of mobile particles. */
+    void gather(const std::vector<OpenMM::Vec3>& all, std::vector<numerics::Vec3>& mobile) const;
     std::vector<OpenMM::Vec3> scattered(const std::vector<numerics::Vec3>& mobile,
                                         double scale) const;
     numerics::Plan planFor(const numerics::Lattice& box) const;
@@ -63,7 +64,8 @@ private:
     StageClock clock;
     int seed = 0;
     uint64_t steps = 0, samples = 0;
-    std::vector<numerics::Vec3> velocities;
+    /// of mobile particles; kept between steps, because large arrays are dear to allocate
+    std::vector<numerics::Vec3> forces, positions, velocities;
 };
 
 } // namespace PSE
