@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""The comparison behind `./run bench`: what fails, what is only reported, and what a broken file of counts leads to."""
+
+import copy
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[1] / "benchmarks" / "instruction_counts.py"
+SPEC = importlib.util.spec_from_file_location("instruction_counts", SCRIPT)
+bench = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(bench)
+
+KEPT = {
+    "environment": {"target": "AVX2", "FFTW": "1"},
+    "cases": {"small": {"total": 1000, "ours": 400, "FFTW": 300, "OpenMM": 200, "system": 100}},
+}
+
+
+def changed(environment=None, **counts):
+    """KEPT with other counts of its case."""
+    result = copy.deepcopy(KEPT)
+    result["cases"]["small"].update(counts)
+    result["environment"].update(environment or {})
+    return result
+
+
+def run(tmp_path, measured, *arguments, kept=KEPT):
+    """Exit status of the script with a file of counts (none if kept is None) and counts given instead of measured."""
+    path = tmp_path / "counts.json"
+    if kept is not None:
+        path.write_text(kept if isinstance(kept, str) else json.dumps(kept))
+    call = ["--program", "unused", "--file", str(path), *arguments]
+    return bench.main(call, measure=lambda program, progress: measured)
+
+
+@pytest.mark.parametrize(
+    "counts, status, verdict",
+    [
+        ({}, 0, "ok"),
+        ({"total": 1049, "ours": 419}, 0, "ok"),
+        ({"total": 1051}, 1, "GREW (total +5.1%)"),
+        ({"total": 1030, "ours": 430}, 1, "GREW (ours +7.5%)"),
+        ({"total": 900}, 0, "shrank: keep it with --update"),
+    ],
+)
+def testGrowthBeyondFivePercentFails(tmp_path, capsys, counts, status, verdict):
+    assert run(tmp_path, changed(**counts)) == status
+    printed = capsys.readouterr().out
+    assert verdict in printed
+    assert ("FAILED" in printed) == (status == 1)
+
+
+def testGrowthWithAnotherLibraryIsReportedOnly(tmp_path, capsys):
+    assert run(tmp_path, changed({"FFTW": "2"}, total=2000)) == 0
+    printed = capsys.readouterr().out
+    assert "GREW (total +100.0%), but not only the sources differ" in printed
+    assert "FFTW: kept 1, here 2" in printed
+
+
+def testNewAndLostCasesAreReported(tmp_path, capsys):
+    measured = copy.deepcopy(KEPT)
+    measured["cases"]["large"] = measured["cases"].pop("small")
+    assert run(tmp_path, measured) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any("large" in line and "new: keep it with --update" in line for line in lines)
+    assert any("small" in line and "gone: drop it with --update" in line for line in lines)
+
+
+@pytest.mark.parametrize("kept", [None, "{ not JSON"])
+def testMissingOrDamagedFileSaysWhatToDo(tmp_path, capsys, kept):
+    assert run(tmp_path, KEPT, kept=kept) == 2
+    printed = capsys.readouterr().err
+    assert "counts.json" in printed and "./run bench --update" in printed
+
+
+@pytest.mark.parametrize("kept", [None, "{ not JSON", KEPT])
+def testUpdateKeepsWhatWasMeasured(tmp_path, kept):
+    measured = changed(total=5000)
+    assert run(tmp_path, measured, "--update", kept=kept) == 0
+    assert bench.load(tmp_path / "counts.json") == measured
+
+
+def testAnotherInstructionSetIsSkipped(tmp_path, capsys):
+    measured = {"environment": {"target": "SSE4"}, "cases": {}}
+    assert run(tmp_path, measured, "--update") == 0
+    assert "Skipped" in capsys.readouterr().out
+    assert bench.load(tmp_path / "counts.json") == KEPT
+
+
+def testMissingProgramIsNamed(tmp_path, capsys):
+    path = tmp_path / "counts.json"
+    path.write_text(json.dumps(KEPT))
+    assert bench.main(["--program", str(tmp_path / "absent"), "--file", str(path)]) == 2
+    assert capsys.readouterr().err.startswith("bench: ")
+
+
+def testCostsOfCalleesAreCountedOnceAndByOwner():
+    profile = """events: Ir
+ob=(1) /x/plugins/libOpenMMPSECPU.so
+fn=(1) step
+10 100
+cob=(2) /usr/lib/libfftw3f.so.3
+cfn=(2) execute
+calls=3 0
+11 5000
++1 7
+ob=(2)
+fn=(2)
+0 5000
+ob=(3) /x/lib/libOpenMM.so
+* 20
+cob=(1)
+calls=1 10
+-2 107
+ob=(4) /lib/libc.so.6
+3 9
+totals: 5136
+""".splitlines(True)
+    counts = bench.instructionsByOwner(profile)
+    assert counts == {"total": 5136, "ours": 107, "FFTW": 5000, "OpenMM": 20, "system": 9}
+
+
+def testKeptCountsAreComplete():
+    kept = bench.load(bench.COUNTS)
+    assert kept["environment"]["target"] == bench.TARGET
+    assert len(kept["cases"]) >= 5
+    for counts in kept["cases"].values():
+        parts = [counts[owner] for owner in (*bench.OWNERS, bench.REST)]
+        assert counts["total"] == sum(parts) and min(parts) > 0
