@@ -6,18 +6,34 @@ if(NOT CALLGRIND_INCLUDE_DIR OR NOT benchmark_FOUND)
     message(FATAL_ERROR "Google Benchmark or valgrind/callgrind.h was not found; install them "
         "(Debian, Ubuntu: apt-get install libbenchmark-dev valgrind) or set PSE_BUILD_BENCHMARKS=OFF")
 endif()
+pse_find(PSE::FFTWThreads libfftw3-dev fftw3.h "" fftw3_threads fftw3f_threads)
 
-# pse_benchmark(<target> <library>...): one program from benchmarks/<target>.cpp
+# pse_benchmark(<target> <source>...): a program that loads the plugins as just built
 function(pse_benchmark target)
-    add_executable(${target} benchmarks/${target}.cpp)
+    list(TRANSFORM ARGN PREPEND benchmarks/)
+    add_executable(${target} ${ARGN})
     pse_defaults(${target})
     pse_warnings(${target})
-    target_include_directories(${target} SYSTEM PRIVATE ${CALLGRIND_INCLUDE_DIR})
-    # OpenMM's plugins first: ours, as just built, replace installed ones
+    # OpenMM's plugins first: ours replace those that are installed
     target_compile_definitions(${target} PRIVATE
         PSE_PLUGIN_FOLDERS="${OPENMM_DIR}/lib/plugins:${PSE_PLUGIN_OUTPUT_DIR}")
-    target_link_libraries(${target} PRIVATE PSE ${ARGN})
-    add_dependencies(${target} OpenMMPSECPU OpenMMPSEReference)
+    target_link_libraries(${target} PRIVATE PSE)
+    add_dependencies(${target} OpenMMPSECPU)
 endfunction()
 
-pse_benchmark(counted_steps PSE::FFTW PSE::Highway)
+pse_benchmark(counted_steps counted_steps.cpp)
+target_include_directories(counted_steps SYSTEM PRIVATE ${CALLGRIND_INCLUDE_DIR})
+target_link_libraries(counted_steps PRIVATE PSE::FFTW PSE::Highway)
+
+# The classes of the CPU platform once more, for a program to call: the plugin shows none of them.
+pse_static_library(psecpu platforms/cpu)
+target_include_directories(psecpu PUBLIC platforms/cpu)
+target_link_libraries(psecpu PUBLIC psehost OpenMM::CPU PSE::FFTW PSE::Highway)
+pse_benchmark(bench_stages bench_steps.cpp bench_stages.cpp bench_fft.cpp)
+target_link_libraries(bench_stages PRIVATE psecpu benchmark::benchmark PSE::FFTWThreads)
+foreach(kind r2c c2r "")
+    foreach(precision f "")
+        string(JOIN _ planner fftw${precision}_plan_many_dft ${kind})
+        target_link_options(bench_stages PRIVATE -Wl,--wrap=${planner})
+    endforeach()
+endforeach()

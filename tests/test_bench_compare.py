@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""The comparison behind `./run bench`: what fails, what is only reported, and what a broken file of counts leads to."""
+"""The judgements behind `./run bench`: what fails, what is only reported, and what a broken file of counts leads to."""
 
 import copy
 import importlib.util
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[1] / "benchmarks" / "instruction_counts.py"
-SPEC = importlib.util.spec_from_file_location("instruction_counts", SCRIPT)
-bench = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(bench)
+FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+def script(name):
+    """A script of the benchmarks as a module."""
+    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+bench, reach = script("instruction_counts"), script("reach")
 
 KEPT = {
     "environment": {"target": "AVX2", "FFTW": "1"},
@@ -130,3 +140,46 @@ def testKeptCountsAreComplete():
     for counts in kept["cases"].values():
         parts = [counts[owner] for owner in (*bench.OWNERS, bench.REST)]
         assert counts["total"] == sum(parts) and min(parts) > 0
+
+
+@pytest.mark.parametrize(
+    "value, target, expected",
+    [
+        (4.0, (8, 4, True), "aim"),
+        (4.1, (8, 4, True), "must"),
+        (8.1, (8, 4, True), "MISSED"),
+        (0.8, (0.6, 0.8, False), "aim"),
+        (0.7, (0.6, 0.8, False), "must"),
+        (0.5, (0.6, 0.8, False), "MISSED"),
+    ],
+)
+def testVerdictsOfReach(value, target, expected):
+    assert reach.verdict(value, *target) == expected
+
+
+def testReachJudgesTheMedianOfTheRatiosOfRounds():
+    slow, fast = reach.Times(), reach.Times()
+    for above, below in ((3.0, 1.0), (40.0, 8.0), (7.0, 1.0)):  # the machine was busy in the second round
+        slow.add(above, 2*above)
+        fast.add(below, below)
+    row = reach.judged(reach.Result("step", reach.ratio, (slow, fast), "note"), 0.25)
+    assert (row["measured"], row["lowest"], row["highest"]) == (5, 3, 7)
+    assert row["byCpu"] == 10 and row["verdict"] == "must"
+
+
+def testReachHasATargetForEveryRowItMeasures():
+    missed = {name for name in reach.TARGETS if name.split(",")[0].split(" ")[0] not in reach.ROWS}
+    assert not missed
+    for what, must, aim, lessIsBetter in reach.TARGETS.values():
+        assert (aim < must) == lessIsBetter, what
+
+
+@pytest.mark.parametrize("shuffled", [True, False])
+def testReachScenesAreSuspensions(shuffled):
+    """The volume fraction asked for, all inside the box, and in the order of space or not."""
+    positions, length = reach.latticePositions(1000, 0.2, shuffled)
+    assert len(positions) == 1000
+    assert 1000*4/3*math.pi*reach.RADIUS**3/length**3 == pytest.approx(0.2)
+    assert positions.min() > 0 and positions.max() < length
+    toNext = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    assert (np.median(toNext) > 0.3*length) == shuffled
