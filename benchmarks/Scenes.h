@@ -7,8 +7,10 @@
 
 #include "OpenMM.h"
 #include "openmmpse/PSEBrownianIntegrator.h"
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <sstream>
 #include <string>

@@ -3,7 +3,7 @@
 // One thread, fixed seeds, one instruction set: the counts are the same from run to run.
 #include "Scenes.h"
 #include <cstdio>
-#include <cstring>
+#include <cstdlib>
 #include <fftw3.h>
 #include <gnu/libc-version.h>
 #include <hwy/highway.h>

@@ -126,11 +126,11 @@ class Times:
 
 def takeTurns(contenders, rounds):
     """The Times per step of each contender."""
-    all = [Times() for _ in contenders]
+    taken = [Times() for _ in contenders]
     for _ in range(rounds):
-        for times, contender in zip(all, contenders):
+        for times, contender in zip(taken, contenders):
             contender.visit(times)
-    return all
+    return taken
 
 
 # ---------------------------------------------------------------- rows
@@ -202,9 +202,9 @@ def rowLarge(options):
 
 def rowPhi(options):
     fractions = (0.01, 0.05, 0.1, 0.2, 0.4)
-    all = takeTurns([Contender(phi=phi) for phi in fractions], options.rounds)
-    note = ", ".join(f"{phi:g}: {times}" for phi, times in zip(fractions, all))
-    return [Result("phi", lambda *seconds: min(seconds)/max(seconds), all, note)]
+    taken = takeTurns([Contender(phi=phi) for phi in fractions], options.rounds)
+    note = ", ".join(f"{phi:g}: {times}" for phi, times in zip(fractions, taken))
+    return [Result("phi", lambda *seconds: min(seconds)/max(seconds), taken, note)]
 
 
 def rowTolerance(options):
@@ -221,7 +221,7 @@ def rowThreads(options):
     return [Result("threads", ratio, (one, two), f"{one} on one, {two} on two", cpu=False)]
 
 
-def runAlone(options, name, count):
+def peakAlone(options, name, count):
     """The peak memory (bytes) of a process that runs one benchmark of bench_stages, and nothing else."""
     command = [options.program, f"--scene={count},100,3,2", f"--benchmark_filter=^{name}/N", "--benchmark_min_time=0.001",
                "--benchmark_format=json"]
@@ -233,7 +233,7 @@ def runAlone(options, name, count):
 def rowMemory(options):
     """A Context and a few steps with PSEBrownianIntegrator, less the same with BrownianIntegrator."""
     count = LARGE//10 if options.quick else LARGE
-    fluid, plain = (runAlone(options, f"step/{name}", count) for name in ("PSEBrownianIntegrator", "BrownianIntegrator"))
+    fluid, plain = (peakAlone(options, f"step/{name}", count) for name in ("PSEBrownianIntegrator", "BrownianIntegrator"))
     result = Result("memory", None, (), f"N = {count:,}: {fluid/1e6:,.0f} MB against {plain/1e6:,.0f} MB", cpu=False)
     result.values = [(fluid - plain)/count]
     return [result]
