@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Measure the targets of speed and memory of the CPU platform, each as a ratio inside one run, and judge them.
 
-Everything: tolerance 1e-3, kT > 0, volume fraction 0.1, two threads, unless the row says otherwise; dt D0/a^2 = 1e-3, so
-that neighbour lists age as they do in real runs. Contenders take turns in rounds; a row is the median of the ratios of
-the rounds, with the smallest and largest beside it. "Others" is the share of the machine's processors that other
+Everything: tolerance 1e-3, kT > 0, volume fraction 0.1, two threads, unless the row says otherwise; dt D0/a^2 = 1e-3,
+so that neighbour lists age as they do in real runs. Contenders take turns in rounds; a row is the median of the ratios
+of the rounds, with the smallest and largest beside it. "Others" is the share of the machine's processors that other
 processes took meanwhile: above a few percent, times on the wall say little, and "by CPU", the same from the processor
 time of all threads, says more (it knows nothing of threads that wait for each other).
 
@@ -188,7 +188,8 @@ def rowFft(options):
 def rowPtps(options):
     contender = Contender()
     times, = takeTurns([contender], 2*options.rounds)
-    result = Result("ptps", lambda seconds: contender.count/seconds, (times,), f"{times}; absolute: needs an idle machine")
+    note = f"{times}; absolute: needs an idle machine"
+    result = Result("ptps", lambda seconds: contender.count/seconds, (times,), note)
     result.byCpu = [2*value for value in result.byCpu]  # as if both threads had a processor each, all the time
     return [result]
 
@@ -223,8 +224,8 @@ def rowThreads(options):
 
 def peakAlone(options, name, count):
     """The peak memory (bytes) of a process that runs one benchmark of bench_stages, and nothing else."""
-    command = [options.program, f"--scene={count},100,3,2", f"--benchmark_filter=^{name}/N", "--benchmark_min_time=0.001",
-               "--benchmark_format=json"]
+    command = [options.program, f"--scene={count},100,3,2", f"--benchmark_filter=^{name}/N",
+               "--benchmark_min_time=0.001", "--benchmark_format=json"]
     report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     entry, = report["benchmarks"]
     return entry["peak bytes"]
@@ -233,7 +234,8 @@ def peakAlone(options, name, count):
 def rowMemory(options):
     """A Context and a few steps with PSEBrownianIntegrator, less the same with BrownianIntegrator."""
     count = LARGE//10 if options.quick else LARGE
-    fluid, plain = (peakAlone(options, f"step/{name}", count) for name in ("PSEBrownianIntegrator", "BrownianIntegrator"))
+    fluid, plain = (peakAlone(options, f"step/{name}", count)
+                    for name in ("PSEBrownianIntegrator", "BrownianIntegrator"))
     result = Result("memory", None, (), f"N = {count:,}: {fluid/1e6:,.0f} MB against {plain/1e6:,.0f} MB", cpu=False)
     result.values = [(fluid - plain)/count]
     return [result]
@@ -300,8 +302,8 @@ def line(row):
             f"{spread:<20}{row['verdict']:<7}{byCpu:>10}{row['others']:>8.0%}  {row['note']}")
 
 
-HEADER = (f"{'what':<56}{'must':>10}{'aim':>10}{'measured':>10}  {'spread':<20}{'meets':<7}{'by CPU':>10}{'others':>8}  "
-          "note")
+HEADER = (f"{'what':<56}{'must':>10}{'aim':>10}{'measured':>10}  {'spread':<20}{'meets':<7}{'by CPU':>10}"
+          f"{'others':>8}  note")
 
 
 class Processors:
@@ -312,11 +314,12 @@ class Processors:
 
     @staticmethod
     def now():
+        """Seconds since the start: of all processors, of those neither idle nor waiting, and of this process."""
         fields = [int(field) for field in Path("/proc/stat").read_text(encoding="ascii").split("\n", 1)[0].split()[1:9]]
         ticks = os.sysconf("SC_CLK_TCK")
         own = sum(usage.ru_utime + usage.ru_stime
                   for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
-        return sum(fields)/ticks, (sum(fields) - fields[3] - fields[4])/ticks, own  # total, busy (not idle, not waiting), own
+        return sum(fields)/ticks, (sum(fields) - fields[3] - fields[4])/ticks, own
 
     def others(self):
         total, busy, own = (b - a for a, b in zip(self.before, self.now()))
@@ -325,7 +328,8 @@ class Processors:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS), metavar="ROW", help=f"of {', '.join(ROWS)}")
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS), metavar="ROW",
+                        help=f"of {', '.join(ROWS)}")
     parser.add_argument("--quick", action="store_true", help="fewer rounds; 100,000 particles for 1,000,000")
     parser.add_argument("--program", type=Path, default=PROGRAM, help="bench_stages (default: %(default)s)")
     parser.add_argument("--output", type=Path, help="write the table here, too, as JSON")
