@@ -168,6 +168,13 @@ def testReachJudgesTheMedianOfTheRatiosOfRounds():
     assert row["byCpu"] == 10 and row["verdict"] == "must"
 
 
+@pytest.mark.parametrize("others, mark", [(0.02, "must "), (0.5, "must?")])
+def testReachDoubtsTimesOnABusyMachine(others, mark):
+    result = reach.Result("step", None, (), "note", cpu=False)
+    result.values = [7.0]
+    assert mark in reach.line(reach.judged(result, others))
+
+
 def testReachHasATargetForEveryRowItMeasures():
     missed = {name for name in reach.TARGETS if name.split(",")[0].split(" ")[0] not in reach.ROWS}
     assert not missed
