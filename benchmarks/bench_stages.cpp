@@ -34,21 +34,24 @@ NoiseKey key(Stream stream, uint64_t counter) {
     return {1, stream, counter};
 }
 
+/** The positions in fractions of the box. */
+std::vector<Vec3> fractionsOf(const Arguments& arguments) {
+    std::vector<Vec3> fractions = positionsOf(arguments);
+    for (Vec3& x : fractions)
+        x = arguments.box().wrappedFractional(x);
+    return fractions;
+}
+
 /** The real half alone. */
 template <class Real> struct RealHalf {
     explicit RealHalf(const Arguments& arguments)
-        : plan(planFor(arguments)), x(positionsOf(arguments)), pool(arguments.threads),
-          threads(pool, false), half(plan, arguments.box(), threads, pool),
-          v(randomNumbers<Real>(3 * x.size())), out(v.size()) {
-        half.setPositions(x);
-    }
-    /** Too far for any list to stay valid. */
-    void jump() {
-        for (Vec3& p : x)
-            p += Vec3(3, 4, 5) * RADIUS;
+        : plan(planFor(arguments)), fractions(fractionsOf(arguments)), pool(arguments.threads),
+          threads(pool, false), half(plan, arguments.box(), threads),
+          v(randomNumbers<Real>(3 * fractions.size() + 1)), out(3 * fractions.size()) {
+        half.setPositions(fractions);
     }
     Plan plan;
-    std::vector<Vec3> x;
+    std::vector<Vec3> fractions;
     OpenMM::ThreadPool pool;
     Threads threads;
     CpuRealSpace<Real> half;
@@ -63,25 +66,12 @@ template <class Work> void inPrecision(const Arguments& arguments, Work work) {
         work(double());
 }
 
-void neighbourList(benchmark::State& state) {
-    const Arguments arguments(state);
-    inPrecision(arguments, [&](auto real) {
-        RealHalf<decltype(real)> scene(arguments);
-        for (auto _ : state) {
-            state.PauseTiming();
-            scene.jump();
-            state.ResumeTiming();
-            scene.half.setPositions(scene.x);
-        }
-    });
-}
-
-void pairCoefficients(benchmark::State& state) {
+void neighbours(benchmark::State& state) {
     const Arguments arguments(state);
     inPrecision(arguments, [&](auto real) {
         RealHalf<decltype(real)> scene(arguments);
         for (auto _ : state)
-            scene.half.setPositions(scene.x);
+            scene.half.setPositions(scene.fractions);
     });
 }
 
@@ -90,7 +80,7 @@ void product(benchmark::State& state) {
     inPrecision(arguments, [&](auto real) {
         RealHalf<decltype(real)> scene(arguments);
         for (auto _ : state)
-            scene.half.multiply(scene.v, scene.out);
+            scene.half.multiplyAdd(scene.v, 1, scene.v, 0, scene.out);
     });
 }
 
@@ -100,10 +90,10 @@ void squareRoot(benchmark::State& state) {
         RealHalf<decltype(real)> scene(arguments);
         int iterations = 0;
         const double negative = std::max(2 * scene.plan.predictedError, 1e-10);
+        scene.half.basis(0) = scene.v;
         for (auto _ : state)
-            iterations =
-                lanczosSquareRoot(scene.half, scene.v, scene.out, scene.plan.lanczosTolerance,
-                                  negative, scene.plan.precision == Precision::Double);
+            iterations = lanczosSquareRoot(scene.half, scene.out, scene.plan.lanczosTolerance,
+                                           negative, scene.plan.precision == Precision::Double);
         state.counters["iterations"] = iterations;
     });
 }
@@ -111,12 +101,12 @@ void squareRoot(benchmark::State& state) {
 void windowWeights(benchmark::State& state) {
     const Arguments arguments(state);
     inPrecision(arguments, [&](auto real) {
-        const std::vector<Vec3> x = positionsOf(arguments);
+        const std::vector<Vec3> fractions = fractionsOf(arguments);
         OpenMM::ThreadPool pool(arguments.threads);
         const Threads threads(pool, false);
         CpuWaveSpace<decltype(real)> half(planFor(arguments), arguments.box(), threads);
         for (auto _ : state)
-            half.setPositions(x);
+            half.setPositions(fractions);
     });
 }
 
@@ -133,10 +123,7 @@ void reportStages(benchmark::State& state, const std::vector<StageTime>& before,
     }
 }
 
-/**
- * Everything that a step does besides the Forces, at positions that do not move: the neighbour list
- * is not built anew.
- */
+/** Everything that a step does besides the Forces. */
 template <bool FORCED, bool THERMAL, bool MEASURED = false> void engine(benchmark::State& state) {
     const Arguments arguments(state);
     const Plan plan = planFor(arguments);
@@ -176,8 +163,7 @@ template <bool FORCED, bool THERMAL, bool MEASURED = false> void engine(benchmar
 } // namespace
 
 void addStages(const SceneList& scenes) {
-    add("real half/neighbour list and pair coefficients", neighbourList, scenes);
-    add("real half/pair coefficients", pairCoefficients, scenes);
+    add("real half/neighbours and pair coefficients", neighbours, scenes);
     add("real half/one product", product, scenes);
     add("real half/Lanczos", squareRoot, scenes);
     add("wave half/window weights", windowWeights, scenes);

@@ -25,10 +25,6 @@ pse_benchmark(counted_steps counted_steps.cpp)
 target_include_directories(counted_steps SYSTEM PRIVATE ${CALLGRIND_INCLUDE_DIR})
 target_link_libraries(counted_steps PRIVATE PSE::FFTW PSE::Highway)
 
-# The classes of the CPU platform once more, for a program to call: the plugin shows none of them.
-pse_static_library(psecpu platforms/cpu)
-target_include_directories(psecpu PUBLIC platforms/cpu)
-target_link_libraries(psecpu PUBLIC psehost OpenMM::CPU PSE::FFTW PSE::Highway)
 pse_benchmark(bench_stages bench_steps.cpp bench_stages.cpp bench_fft.cpp)
 target_link_libraries(bench_stages PRIVATE psecpu benchmark::benchmark PSE::FFTWThreads)
 foreach(kind r2c c2r "")

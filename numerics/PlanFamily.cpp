@@ -23,9 +23,10 @@ constexpr double SMALL_BOX_SHARE = 0.5; ///< of the budget, therefore
 /// that they carry, which the tolerance is relative to: farther pairs do not count. Not so in long
 /// boxes, where few waves carry most of it.
 constexpr double LARGEST_EXTENT = 12;
-constexpr double LONG_BOX = 2; ///< longest over shortest box vector
-/// refinements of grid and window beyond the rules [T15]
-constexpr int LAST_ATTEMPT = 12;
+constexpr double LONG_BOX = 2;  ///< longest over shortest box vector
+constexpr int MORE_SUPPORT = 4; ///< than the rule, at most
+/// the other end of the grids that are tried, see FINEST, and how closely the best is sought
+constexpr double COARSEST = 0.85, GRID_PRECISION = 0.004;
 constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
 /// predicted error below which single precision would be the larger error, as a share of its floor
 constexpr double SINGLE_SHARE = 0.1;
@@ -143,6 +144,70 @@ void PlanFamily::predict(Plan& plan, double wave) const {
         plan.precision = Precision::Double;
 }
 
+std::vector<int> PlanFamily::supports() const {
+    if (request.overrides.windowSupport > 0)
+        return {request.overrides.windowSupport};
+    return {supportFor(error), supportFor(error) - 1};
+}
+
+bool PlanFamily::fitGrid(Plan& plan, double unit, double& wave) const {
+    if (request.overrides.grid[0] > 0) {
+        wave = waveErrorOf(plan);
+        return wave <= error;
+    }
+    const auto evaluate = [&](double nyquist) {
+        plan.grid = gridFor(nyquist * unit, plan.windowSupport);
+        if (*std::max_element(plan.grid.begin(), plan.grid.end()) > WIDEST_GRID)
+            return std::numeric_limits<double>::infinity();
+        return waveErrorOf(plan);
+    };
+    double low = COARSEST, high = FINEST;
+    wave = evaluate(high);
+    if (!(wave <= error))
+        return false;
+    std::array<int, 3> fitting = plan.grid, failing = {0, 0, 0};
+    while (high - low > GRID_PRECISION * high) {
+        const double mid = std::sqrt(low * high);
+        const std::array<int, 3> grid = gridFor(mid * unit, plan.windowSupport);
+        bool fits = (grid == fitting);
+        if (!fits && grid != failing) {
+            const double found = evaluate(mid);
+            fits = (found <= error);
+            (fits ? fitting : failing) = grid;
+            wave = (fits ? found : wave);
+        }
+        (fits ? high : low) = mid;
+    }
+    plan.grid = fitting;
+    return true;
+}
+
+Plan PlanFamily::finished(const Plan& plan, double unit) const {
+    std::vector<int> candidates = supports();
+    const size_t usual = candidates.size();
+    if (request.overrides.windowSupport == 0 && request.overrides.windowShape == 0)
+        for (int wider = 1; wider <= MORE_SUPPORT; wider++) // for what the usual ones cannot do
+            candidates.push_back(std::min(candidates[0] + wider, LARGEST_SUPPORT));
+    Plan best = plan;
+    double bestWave = std::numeric_limits<double>::infinity();
+    bool fits = false;
+    for (size_t i = 0; i < candidates.size() && !(fits && i >= usual); i++) {
+        Plan candidate = plan;
+        candidate.windowSupport = candidates[i];
+        if (request.overrides.windowShape == 0)
+            candidate.windowShape = shapeFor(error, candidates[i]);
+        double wave = 0;
+        const bool fit = fitGrid(candidate, unit, wave);
+        if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {
+            best = candidate;
+            bestWave = wave;
+        }
+        fits = fits || fit;
+    }
+    predict(best, bestWave);
+    return best;
+}
+
 std::string PlanFamily::windowRefusal(const Plan& plan, double wave) const {
     std::ostringstream message;
     message << "a window of support " << plan.windowSupport << " and shape " << plan.windowShape
@@ -172,7 +237,7 @@ Plan HasimotoPlans::best() const {
             Plan plan = at(xi, cost);
             if (gridGiven) {
                 checkPlan(plan, request);
-                finish(plan);
+                plan = finishedOrRefused(plan);
                 if (plan.predictedError > request.tolerance)
                     cost = plan.predictedError * 1e100;
             }
@@ -183,7 +248,7 @@ Plan HasimotoPlans::best() const {
         }
     }
     checkPlan(best, request);
-    finish(best);
+    best = finishedOrRefused(best);
     checkPlan(best, request);
     return best;
 }
@@ -233,21 +298,9 @@ void HasimotoPlans::chooseWindow(Plan& plan, double& lowest) const {
         (wish.windowShape > 0 ? wish.windowShape : shapeFor(error, plan.windowSupport));
 }
 
-void HasimotoPlans::finish(Plan& plan) const {
+Plan HasimotoPlans::finishedOrRefused(const Plan& candidate) const {
     const PlanOverrides& wish = request.overrides;
-    const bool freeGrid = (wish.grid[0] == 0),
-               freeWindow = (wish.windowSupport == 0 && wish.windowShape == 0);
-    double wave = waveErrorOf(plan);
-    for (int attempt = 1; freeGrid && wave > error && attempt <= LAST_ATTEMPT; attempt++) {
-        if (freeWindow && attempt % 3 == 0 && plan.windowSupport < LARGEST_SUPPORT) {
-            plan.windowSupport++;
-            plan.windowShape = shapeFor(error, plan.windowSupport);
-        }
-        for (int d = 0; d < 3; d++)
-            plan.grid[d] = nextFftSize(std::max(plan.grid[d] + 1, plan.windowSupport));
-        wave = waveErrorOf(plan);
-    }
-    predict(plan, wave);
+    const Plan plan = finished(candidate, nyquistOf(candidate));
     const double real = realErrorOf(plan);
     if (wish.realCutoff == 0 && wish.xi == 0 && !(real <= request.tolerance)) {
         std::ostringstream message;
@@ -264,8 +317,11 @@ void HasimotoPlans::finish(Plan& plan) const {
                 << "; choose a smaller splitting parameter, or 0 for the automatic one";
         throw std::invalid_argument(message.str());
     }
-    if (freeGrid && !(wave <= request.tolerance))
+    const double wave =
+        std::sqrt(std::max(0.0, plan.predictedError * plan.predictedError - real * real));
+    if (wish.grid[0] == 0 && !(wave <= request.tolerance))
         throw std::invalid_argument(windowRefusal(plan, wave));
+    return plan;
 }
 
 } // namespace PSE::numerics

@@ -19,6 +19,8 @@ constexpr double LARGEST_LIST_RANGE = 0.499;
 constexpr double WIDEST_GRID = 32768;
 
 constexpr int LARGEST_SUPPORT = 16; ///< what platforms have room for
+/// times the unit of a family: the finest Nyquist wave number at which a grid is sought
+constexpr double FINEST = 2.2;
 
 double volumeFraction(const PlanRequest& request);
 /** @throws std::invalid_argument naming what cannot be */
@@ -44,8 +46,14 @@ protected:
     /** Everything that follows from split and range alone. */
     void completeRealHalf(Plan& plan) const;
     double realErrorOf(const Plan& plan) const;
-    /** Set the predicted error, and the precision that it needs. */
-    void predict(Plan& plan, double wave) const;
+    /** Window supports worth trying first: by the rule, and one less on a finer grid. */
+    std::vector<int> supports() const;
+    /**
+     * The same split with the cheapest window and the smallest grid that keep the budget by the
+     * full estimate, or come nearest to it, and the error that it predicts.
+     * @param unit  the Nyquist wave number (1/a) about which the grid is sought
+     */
+    Plan finished(const Plan& plan, double unit) const;
     /** That no grid helps this window, in words. */
     std::string windowRefusal(const Plan& plan, double wave) const;
 
@@ -54,6 +62,12 @@ protected:
     /// error allowed to the wave half, 1/(6 pi eta a)
     double error;
     double meanPhi, phi, extent;
+
+private:
+    /** The smallest grid that keeps the budget by the full estimate; false if there is none. */
+    bool fitGrid(Plan& plan, double unit, double& wave) const;
+    /** Set the predicted error, and the precision that it needs. */
+    void predict(Plan& plan, double wave) const;
 };
 
 /** Plans with Hasimoto's split, by xi: each half may use half of the tolerance. */
@@ -67,10 +81,11 @@ private:
     Plan at(double xi, double& cost) const;
     void chooseWindow(Plan& plan, double& cost) const;
     /**
-     * Refine an automatic grid, and widen an automatic window where that does not help, until the
-     * full estimate of the wave error keeps the budget; set the predicted error.
+     * Window and grid by the full estimate.
+     * @throws std::invalid_argument naming what cannot be met
      */
-    void finish(Plan& plan) const;
+    Plan finishedOrRefused(const Plan& plan) const;
+    double nyquistOf(const Plan& plan) const { return plan.split->waveCutoff(error, phi); }
 };
 
 /** Plans with the prolate split, by its range R: the real half has no error of its own. */
@@ -93,10 +108,6 @@ private:
     std::string missedTolerance(const Plan& plan) const;
     /** Candidate at a range, with the grid of a closed rule. */
     std::optional<Plan> at(double R) const;
-    std::vector<int> supports() const;
-    /** The smallest grid that keeps the budget by the full estimate; false if there is none. */
-    bool fitGrid(Plan& plan, double& wave) const;
-    Plan finished(const Plan& plan) const;
 };
 
 /**

@@ -21,9 +21,6 @@ constexpr double BANDWIDTH_STEP = 1.0 / 64;
 constexpr double FINE_FACTOR = 1.04, FACTOR = 1.12;
 /// radii: here even the tightest tolerance has a valid range
 constexpr double AMPLE_RANGE = 32;
-constexpr int MORE_SUPPORT = 4; ///< than the rule, at most
-/// Nyquist wave numbers in units of c/R between which the grid is sought
-constexpr double COARSEST = 0.9, FINEST = 2.2, GRID_PRECISION = 0.004;
 
 std::shared_ptr<const ProlateSplit> splitOf(double c, double R) {
     return std::make_shared<const ProlateSplit>(c, R);
@@ -32,6 +29,11 @@ std::shared_ptr<const ProlateSplit> splitOf(double c, double R) {
 /** Whether xi and cut-off, where both are given, are those of one range. */
 bool isOneRange(const PlanOverrides& wish) {
     return wish.xi == 0 || wish.realCutoff == 0 || std::fabs(wish.xi * wish.realCutoff - 1) < 1e-9;
+}
+
+/** The wave number up to which H0 is concentrated, in 1/a. */
+double unitOf(const Plan& plan) {
+    return plan.bandwidth * plan.a / plan.realCutoff;
 }
 
 double largestRange(const PlanRequest& request) {
@@ -125,12 +127,6 @@ std::string ProlatePlans::missedTolerance(const Plan& plan) const {
     return message.str();
 }
 
-std::vector<int> ProlatePlans::supports() const {
-    if (request.overrides.windowSupport > 0)
-        return {request.overrides.windowSupport};
-    return {supportFor(error), supportFor(error) - 1};
-}
-
 std::optional<Plan> ProlatePlans::at(double R) const {
     const std::optional<double> c = bandwidthFor(R);
     if (!c)
@@ -160,66 +156,6 @@ std::optional<Plan> ProlatePlans::at(double R) const {
     return cheapest;
 }
 
-bool ProlatePlans::fitGrid(Plan& plan, double& wave) const {
-    if (request.overrides.grid[0] > 0) {
-        wave = waveErrorOf(plan);
-        return wave <= error;
-    }
-    const double unit = plan.bandwidth * plan.a / plan.realCutoff;
-    const auto evaluate = [&](double nyquist) {
-        plan.grid = gridFor(nyquist * unit, plan.windowSupport);
-        if (*std::max_element(plan.grid.begin(), plan.grid.end()) > WIDEST_GRID)
-            return std::numeric_limits<double>::infinity();
-        return waveErrorOf(plan);
-    };
-    double low = COARSEST, high = FINEST;
-    wave = evaluate(high);
-    if (!(wave <= error))
-        return false;
-    std::array<int, 3> fitting = plan.grid, failing = {0, 0, 0};
-    while (high - low > GRID_PRECISION * high) {
-        const double mid = std::sqrt(low * high);
-        const std::array<int, 3> grid = gridFor(mid * unit, plan.windowSupport);
-        bool fits = (grid == fitting);
-        if (!fits && grid != failing) {
-            const double found = evaluate(mid);
-            fits = (found <= error);
-            (fits ? fitting : failing) = grid;
-            wave = (fits ? found : wave);
-        }
-        (fits ? high : low) = mid;
-    }
-    plan.grid = fitting;
-    return true;
-}
-
-/** The same range and bandwidth with the cheapest window and grid that keep the budget. */
-Plan ProlatePlans::finished(const Plan& plan) const {
-    std::vector<int> candidates = supports();
-    const size_t usual = candidates.size();
-    if (request.overrides.windowSupport == 0 && request.overrides.windowShape == 0)
-        for (int wider = 1; wider <= MORE_SUPPORT; wider++) // for what the usual ones cannot do
-            candidates.push_back(std::min(candidates[0] + wider, LARGEST_SUPPORT));
-    Plan best = plan;
-    double bestWave = std::numeric_limits<double>::infinity();
-    bool fits = false;
-    for (size_t i = 0; i < candidates.size() && !(fits && i >= usual); i++) {
-        Plan candidate = plan;
-        candidate.windowSupport = candidates[i];
-        if (request.overrides.windowShape == 0)
-            candidate.windowShape = shapeFor(error, candidates[i]);
-        double wave = 0;
-        const bool fit = fitGrid(candidate, wave);
-        if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {
-            best = candidate;
-            bestWave = wave;
-        }
-        fits = fits || fit;
-    }
-    predict(best, bestWave);
-    return best;
-}
-
 std::optional<Plan> ProlatePlans::best(std::string& obstacle) const {
     const PlanOverrides& wish = request.overrides;
     const double a = request.radius, largest = largestRange(request) / a;
@@ -235,7 +171,7 @@ std::optional<Plan> ProlatePlans::best(std::string& obstacle) const {
             if (plan) {
                 double price = cost(*plan);
                 if (gridGiven) { // it serves only some ranges; else the smallest error is best
-                    plan = finished(*plan);
+                    plan = finished(*plan, unitOf(*plan));
                     price = cost(*plan);
                     if (plan->predictedError > request.tolerance)
                         price = plan->predictedError * 1e100;
@@ -254,7 +190,7 @@ std::optional<Plan> ProlatePlans::best(std::string& obstacle) const {
         obstacle = obstacleTo(given);
         return best;
     }
-    best = finished(*best);
+    best = finished(*best, unitOf(*best));
     obstacle = missedTolerance(*best);
     return obstacle.empty() ? best : std::nullopt;
 }

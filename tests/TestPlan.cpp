@@ -322,9 +322,9 @@ TEST(Plan, ProlateRefusalsNameTheValueAndTheRemedy) {
 }
 
 TEST(Plan, ProlateSavesGridPointsAtEqualRange) {
-    // Hasimoto's smallest grid over xi against the prolate one, same range; the issue asks 1.6-2.3
-    // at 1e-3, 2.4-5.8 at 1e-4, 2.4-4.2 at 1e-6. Grids are sizes of the FFT: a large box makes
-    // their rounding small (8 % in points), and that much is granted.
+    // Hasimoto's smallest grid over xi against the prolate one, same range, by the least factor
+    // expected of it [T22]. Grids are sizes of the FFT: a large box makes their rounding small (8 %
+    // in points), and that much is granted.
     const double L = 100, margin = 0.92;
     const Lattice box = Lattice::orthorhombic(L, L, L);
     const int n = static_cast<int>(0.1 * L * L * L / (4 * M_PI / 3));
