@@ -12,14 +12,14 @@ namespace PSE::numerics {
  */
 struct CostModel {
     /// per particle and point of its P^3 window: spread and gather, three components
-    static constexpr double SPREAD = 16;
+    static constexpr double SPREAD = 2;
     /// per grid point: six real transforms, noise, wave factor
-    static constexpr double GRID = 73;
+    static constexpr double GRID = 75;
     /// per particle and mode of a direct sum, there and back
     static constexpr double DIRECT = 25;
     /// per ordered pair in range: distance and coefficients
-    static constexpr double PAIR_BUILD = 32;
-    static constexpr double PAIR_APPLY = 9; ///< per ordered pair in range and product with M_R
+    static constexpr double PAIR_BUILD = 30;
+    static constexpr double PAIR_APPLY = 5; ///< per ordered pair in range and product with M_R
 
     /**
      * @param pairs   ordered pairs (images included) in range
