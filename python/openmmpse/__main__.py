@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Command line: python -m openmmpse doctor | demo."""
+"""Command line: python -m openmmpse doctor | demo | accuracy."""
 
 import argparse
 import sys
@@ -17,9 +17,16 @@ def _demo(arguments):
     return demo.main(arguments)
 
 
+def _accuracy(arguments):
+    from openmmpse import accuracy
+
+    return accuracy.main(arguments)
+
+
 COMMANDS = {
     "doctor": (_doctor, "check the installation on every platform"),
     "demo": (_demo, "simulate a protein and a polymer in water and compare with theory"),
+    "accuracy": (_accuracy, "measure error against time for your own scene and recommend a tolerance"),
 }
 
 
@@ -30,7 +37,7 @@ def main(argv=None):
         description="Brownian dynamics with hydrodynamic interactions for OpenMM.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="commands:\n"
-        + "\n".join(f"  {name:8} {text}" for name, (_, text) in COMMANDS.items()),
+        + "\n".join(f"  {name:9} {text}" for name, (_, text) in COMMANDS.items()),
     )
     parser.add_argument("command", choices=COMMANDS)
     parser.add_argument(

@@ -1,0 +1,485 @@
+# SPDX-License-Identifier: MIT
+"""What accuracy costs: the errors are right, the recommendation follows its rule, the command writes what it says."""
+import ast
+import copy
+import csv
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import openmm
+import pytest
+from openmm import unit
+
+import openmmpse
+import scenes
+from openmmpse import PSEBrownianIntegrator, accuracy
+from openmmpse.accuracy import command, limits, report, stages, tuning
+from openmmpse.accuracy.limits import Limits, recommend
+from openmmpse.accuracy.scene import Scene, SceneError
+
+TEMPERATURE, STEP = 293.15, 1.0
+KT = scenes.KB*TEMPERATURE
+
+
+def template(temperature=TEMPERATURE, radius=0.5, seed=7):
+    integrator = PSEBrownianIntegrator(temperature, scenes.ETA, radius, STEP)
+    integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
+    integrator.setRandomNumberSeed(seed)
+    return integrator
+
+
+def springs(scene, k=200.0):
+    return scenes.harmonicBonds([(i, i + 1) for i in range(0, scene.count - 1, 2)], 2.4*scene.radius, k)
+
+
+@pytest.fixture(scope="module")
+def small():
+    return scenes.randomSuspension(30, 0.15, scenes.cube(1), 0.5, seed=3)
+
+
+def sceneOf(small, platformName="CPU", temperature=TEMPERATURE, forces=None, masses=None):
+    system = scenes.makeSystem(small, [springs(small)] if forces is None else forces, masses)
+    options = scenes.platformOptions(platformName, 1)
+    return Scene(system, small.positions, template(temperature, small.radius), platform=platformName, properties=options)
+
+
+# ---------------------------------------------------------------- the sweep
+
+def testErrorsAreThoseAgainstTheOracleAndKeepTheTolerance(small, platformName):
+    result = accuracy.measure(sceneOf(small, platformName), rounds=1, tolerances=(1e-1, 1e-2, 1e-3, 1e-4, 1e-5))
+    assert result.complete and result.referenceTolerance == pytest.approx(1e-10)
+    assert [row.tolerance for row in result.rows] == pytest.approx([1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+    for row in result.rows:
+        assert set(row.errors) == {"random", "uniform", "scene"}
+        assert all(0 < error <= row.tolerance for error in row.errors.values())
+        assert row.seconds > 0 and row.bareSeconds > 0 and sum(row.stages.values()) == pytest.approx(1, abs=0.06)
+    for kind in ("random", "uniform", "scene"):
+        errors = [row.errors[kind] for row in result.rows]
+        assert errors[4] < 1e-2*errors[1] < 1e-1*errors[0]
+    # the same numbers from the dense matrix, which knows nothing of tolerances
+    context, integrator = scenes.makeContext(small, platformName, tolerance=1e-2, forces=[springs(small)],
+                                             temperature=TEMPERATURE)
+    force = np.array(context.getState(forces=True).getForces(asNumpy=True)._value)
+    uniform = scenes.uniformForces(small)
+    for kind, forces in (("scene", force), ("uniform", uniform)):
+        assert result.rows[1].errors[kind] == pytest.approx(scenes.errorOf(integrator, forces, small), rel=1e-5)
+
+
+def testNoiseIsCovarianceErrorPlusTwiceTheLanczosError(small, platformName):
+    scene = sceneOf(small, platformName)
+    result = accuracy.measure(scene, rounds=1, tolerances=(1e-1, 1e-3))
+    for row in result.rows:
+        assert row.noise == row.plainErrors["random"] + 2*row.lanczosError
+        if platformName == "Reference":  # its Lanczos process is as tight as the one it is compared with
+            assert row.lanczosError == 0
+        else:
+            assert 0 < row.lanczosError < 2*row.parameters["lanczosTolerance"]
+    assert result.rows[1].noise < 0.1*result.rows[0].noise
+    # One vector of normal forces estimates |dM|/|M| in the Frobenius norm: here with all columns, 90 of them.
+    probe = scene.probe(1e-1)
+    error = np.linalg.norm(scenes.mobilityColumns(probe.integrator, small.count) - small.mobility)
+    assert 0.5 < result.rows[0].plainErrors["random"]/(error/np.linalg.norm(small.mobility)) < 2
+
+
+def testNoiseNumberBoundsTheMeasuredCovariance():
+    """Overlapping particles, a large real half and a Lanczos process stopped after two iterations: its share is visible."""
+    gas = scenes.idealGas(20, 1.0, scenes.cube(1), 0.5, seed=2)
+    scene = sceneOf(gas, forces=[])
+    used = scene.probe(1e-2, parameters={"xi": 0.5}).parameters
+    loose = {**used, "lanczosTolerance": 0.4}
+    lanczos = accuracy.sweep.lanczosError(scene, scene.probe(1e-2, parameters=loose))
+    assert 0.05 < lanczos < 0.1
+    probe = scene.probe(1e-2, parameters=loose)
+    size = np.linalg.norm(gas.mobility)
+    bound = np.linalg.norm(scenes.mobilityColumns(probe.integrator, gas.count) - gas.mobility)/size + 2*lanczos
+    draws = probe.displacements(10000).reshape(10000, -1)/np.sqrt(2*KT*STEP)
+    difference = np.linalg.norm(draws.T @ draws/len(draws) - gas.mobility)/size
+    # of exact noise E|C - M|^2 = (tr M^2 + (tr M)^2)/n, and 1.5 times its root is beyond chance (it is a sum of thousands)
+    chance = 1.5*np.sqrt((size**2 + np.trace(gas.mobility)**2)/len(draws))/size
+    assert chance < 0.15 and difference < bound + chance < 0.35
+
+
+def testLanczosErrorFollowsItsTolerance(small):
+    scene = sceneOf(small)
+    used = scene.probe(1e-2).parameters
+    errors = [accuracy.sweep.lanczosError(scene, scene.probe(1e-2, parameters={**used, "lanczosTolerance": x}))
+              for x in (1e-1, 1e-3, 1e-5)]
+    assert errors[0] > 5*errors[1] > 25*errors[2] > 0
+    assert errors[2] < 1e-5
+
+
+def testTemperatureZeroHasNoNoise(small):
+    result = accuracy.measure(sceneOf(small, temperature=0), rounds=1, tolerances=(1e-2,))
+    (row,) = result.rows
+    assert row.noise is None and row.lanczosError is None and result.limits.statistical is None
+    assert result.limits.timeStep > 0 and "no statistical error" in result.limits.assumptions
+    assert report.table(result)[-1].split()[4] == "-"
+
+
+def testMasslessParticlesAreLeftOut(small):
+    masses = [0.0 if i % 3 == 0 else 1.0 for i in range(small.count)]
+    result = accuracy.measure(sceneOf(small, masses=masses), rounds=1, tolerances=(1e-1, 1e-3))
+    assert result.count == 20
+    assert 0 < result.rows[1].errors["scene"] < 1e-3
+
+
+def testContextIsLeftAsItIs(small):
+    context, integrator = scenes.makeContext(small, "CPU", tolerance=1e-3, forces=[springs(small)],
+                                             temperature=TEMPERATURE)
+    integrator.step(3)
+    before = openmm.XmlSerializer.serialize(context.getState(positions=True, forces=True, parameters=True))
+    draws = copy.copy(integrator), integrator.getNumericalParameters()
+    result = accuracy.measure(context, rounds=1, tolerances=(1e-1,), runLength=1000)
+    assert result.platform == "CPU" and result.runLength == 1000 and len(result.rows) == 1
+    after = openmm.XmlSerializer.serialize(context.getState(positions=True, forces=True, parameters=True))
+    assert before == after and integrator.getNumericalParameters() == draws[1]
+
+
+def testPrescribedParametersAreNamedAndNotUsed(small):
+    integrator = template(radius=small.radius)
+    integrator.setNumericalParameters({"xi": 3.1, "gridDimensions": (40, 40, 40)})
+    system = scenes.makeSystem(small, [springs(small)])
+    result = accuracy.measure(system, small.positions*unit.nanometer, integrator, rounds=1, tolerances=(1e-2,))
+    assert result.rows[0].parameters["xi"] != pytest.approx(3.1)
+    assert any("'xi': 3.1" in note and "40" in note for note in result.notes)
+
+
+def testBoxOfTheStateIsUsed(small):
+    wide = scenes.cube(2*small.box[0, 0])
+    system = scenes.makeSystem(small, [springs(small)])
+    scene = Scene(system, small.positions, template(radius=small.radius), box=wide*unit.nanometer)
+    dilute = scenes.Scene(small.positions, wide, small.radius)
+    forces = scenes.randomForces(dilute)
+    assert scenes.errorRatio(scene.probe(1e-4).velocities(forces), dilute.velocities(forces), forces, dilute) < 1e-4
+    assert system.getDefaultPeriodicBoxVectors()[0][0]._value == pytest.approx(small.box[0, 0])
+
+
+def testTightRunThatTakesTooLongIsLoosened(small):
+    result = accuracy.measure(sceneOf(small), rounds=1, budget=1e-9)
+    assert result.referenceTolerance == pytest.approx(1e-3)
+    assert [row.tolerance for row in result.rows] == pytest.approx([1e-1, 1e-2])
+    assert any("1e-03" in note and "estimate" in note for note in result.notes)
+    assert any("left out" in note for note in result.notes)
+
+
+def testBothSplits(small):
+    result = accuracy.measure(sceneOf(small), split="both", rounds=1, tolerances=(1e-2, 1e-3))
+    assert result.splits[0] == "Hasimoto"
+    if "Prolate" in result.splits:
+        assert all(row.errors["random"] <= row.tolerance for row in result.rowsOf("Prolate"))
+    else:
+        assert any(note.startswith("Prolate split left out at 0.01, 0.001") for note in result.notes)
+
+
+def testProgressReachesTheEnd(small):
+    seen = []
+    accuracy.measure(sceneOf(small), rounds=2, tolerances=(1e-1, 1e-2), progress=lambda *what: seen.append(what))
+    shares = [share for _, share in seen]
+    assert shares == sorted(shares) and shares[-1] == 1.0 and any("0.01" in text for text, _ in seen)
+
+
+# ---------------------------------------------------------------- the recommendation
+
+@pytest.mark.parametrize("timeStep, statistical, expected, word", [
+    (5e-3, 1e-1, 1e-2, "time-step"),
+    (1e-1, 5e-4, 1e-4, "statistical"),
+    (None, 5e-2, 1e-1, "statistical"),
+    (1e-3, None, 1e-3, "time-step"),
+    (1e-9, 1e-2, None, "time-step"),
+    (None, None, None, "no recommendation"),
+])
+def testLoosestToleranceBelowBothErrors(timeStep, statistical, expected, word):
+    errors = {1e-1: 4e-2, 1e-2: 4e-3, 1e-3: 8e-4, 1e-4: 3e-5}
+    tolerance, reason = recommend(errors, Limits(timeStep, statistical, ""))
+    assert tolerance == expected and word in reason
+
+
+def testLongerRunsNeedTighterTolerances(small):
+    scene = sceneOf(small)
+    short, long = (limits.estimate(scene, steps) for steps in (10**4, 10**8))
+    assert short.timeStep == long.timeStep
+    assert short.statistical == pytest.approx(100*long.statistical)
+    independent = limits.estimate(scene, 10**4, correlationTime=1e-3)
+    components = limits.independentComponents(scene)
+    assert independent.statistical == pytest.approx(np.sqrt(2/(components*1e4)))
+    assert "a^2/D0" in short.assumptions and "a^2/D0" not in independent.assumptions
+
+
+def testIndependentComponentsOfTheDenseMatrix(small):
+    """(tr M)^2/tr M^2 against the oracle. Its two sums over n vectors have variances 2 tr M^2/n and 2 tr M^4/n."""
+    M, vectors = small.mobility, 10
+    exact = np.trace(M)**2/np.sum(M**2)
+    spread = 2*np.sqrt(2*np.sum(M**2)/vectors)/np.trace(M) + np.sqrt(2*np.sum((M @ M)**2)/vectors)/np.sum(M**2)
+    assert abs(limits.independentComponents(sceneOf(small))/exact - 1) < 4.9*spread < 1
+    # and this is what the uncertainty of a mean square follows: 4,000 draws of all components
+    draws = np.random.default_rng(1).normal(size=(4000, len(M))) @ np.linalg.cholesky(M).T
+    squares = np.sum(draws**2, axis=1)
+    assert squares.std()/squares.mean() == pytest.approx(limits.statisticalError(exact, 1), rel=0.15)
+
+
+@pytest.mark.parametrize("temperature", (0.0, TEMPERATURE))
+def testTimeStepErrorOfAHarmonicTrap(temperature, platformName):
+    """A mode of stiffness k keeps a variance in error by mu k dt/2 [T1]: exactly what the estimate must say."""
+    box, k = 20.0, 2e4
+    one = scenes.Scene(np.array([[0.3, -0.2, 0.4]]), scenes.cube(box), 0.5)
+    trap = openmm.CustomExternalForce(f"{k/2}*(x^2+y^2+z^2)")
+    trap.addParticle(0, [])
+    x = one.radius/box
+    mobility = one.mu0*(1 - 2.8372974794806*x + 4*np.pi/3*x**3)
+    expected = mobility*k*STEP/2
+    assert limits.timeStepError(sceneOf(one, platformName, temperature, [trap])) == pytest.approx(expected, rel=2e-3)
+
+
+def testTimeStepErrorOfAQuarticTrap():
+    """Here noise changes the mean force: <(x + d + w)^3> = (x + d)^3 + 3 (x + d) s^2, s^2 = kT mu dt in half a step."""
+    a, c, offset, spacing = 0.5, 2e3, 0.1, 30.0
+    sites = spacing*np.stack(np.meshgrid(*[np.arange(4)]*3), -1).reshape(-1, 3)
+    signs = np.random.default_rng(3).choice([-1.0, 1.0], 64)
+    dilute = scenes.Scene(sites + np.outer(signs*offset, [1, 0, 0]), scenes.cube(4*spacing), a)
+    trap = openmm.CustomExternalForce(f"{c}*(x-x0)^4")
+    trap.addPerParticleParameter("x0")
+    for i, site in enumerate(sites):
+        trap.addParticle(i, [site[0]])
+    drift = -4*c*offset**3*dilute.mu0*STEP/2
+    moved, square = offset + drift, KT*dilute.mu0*STEP
+    expected = abs((moved**3 + 3*moved*square)/offset**3 - 1)
+    # 2048 squares of normal numbers: 3 % at one standard deviation, 15 % at a false-alarm rate of 1e-6; mobility 4 %
+    measured = limits.timeStepError(sceneOf(dilute, forces=[trap]))
+    assert 3*square/offset**2 > 0.02 and measured == pytest.approx(expected, rel=0.19)
+
+
+def testMeanLengthIsFreeOfTheBiasOfNoise():
+    generator = np.random.default_rng(4)
+    vector = generator.normal(size=3000)
+    noisy = vector + 5*generator.normal(size=(8, 3000))
+    plain = np.linalg.norm(noisy.mean(axis=0))/np.linalg.norm(vector)
+    # variance of the estimate of the square: 4 s^2/8 + 2 s^4/(8*7) for each of 3000 components, s^2 = 25
+    spread = np.sqrt((4*25/8 + 2*625/56)*3000)/3000/2
+    assert abs(limits.meanLength(noisy)/np.linalg.norm(vector) - 1) < 4.9*spread < 0.4 < plain - 1
+    pure = generator.normal(size=(8, 3000))
+    assert 0 < limits.meanLength(pure) < 0.5*np.linalg.norm(pure.mean(axis=0))
+
+
+# ---------------------------------------------------------------- what describe() says
+
+def testStagesAreReadFromTheDescription(small, platformName):
+    text = "fluid: periodic 50 %\ncost of the steps so far, without the Forces: waves (noise, scaling) 60 %, b 39 %, c 1 %\n"
+    assert stages.shares(text) == {"waves (noise, scaling)": 0.6, "b": 0.39, "c": 0.01}
+    probe = sceneOf(small, platformName).probe(1e-3)
+    assert stages.shares(probe.integrator.describe()) == {}
+    probe.integrator.step(3)
+    assert sum(stages.shares(probe.integrator.describe()).values()) == pytest.approx(1, abs=0.06)
+
+
+# ---------------------------------------------------------------- tuning
+
+def testTuningOffersWhatTheIntegratorAccepts(small, platformName):
+    result = accuracy.tune(sceneOf(small, platformName), tolerance=1e-2, rounds=1)
+    assert result.automatic.settings == {} and len(result.candidates) + len(result.notes) == 9
+    assert result.excess >= 1 and result.best.seconds <= result.automatic.seconds
+    for candidate in result.candidates[1:]:
+        integrator = template(radius=small.radius)
+        integrator.setErrorTolerance(1e-2)
+        integrator.setNumericalParameters(candidate.settings)
+        context = openmm.Context(scenes.makeSystem(small), integrator, scenes.platformNamed(platformName))
+        used = integrator.getNumericalParameters()
+        del context
+        for key in ("xi", "gridDimensions", "windowSupport", "realCutoff"):
+            assert used[key] == candidate.parameters[key]
+        assert candidate.error <= 2e-2
+    assert len({candidate.parameters["xi"] for candidate in result.candidates}) >= 5
+
+
+def testTuningKeepsTheTolerance():
+    def candidate(label, seconds, error):
+        return tuning.Candidate(label, {"xi": 1.0}, {}, error, [2*seconds, seconds])
+
+    slow, fast, wrong = candidate("automatic", 3.0, 5e-4), candidate("fast", 2.0, 1.2e-3), candidate("wrong", 1.0, 2e-3)
+    result = tuning.Tuning(1e-3, [slow, wrong, fast])
+    assert result.best is fast and result.excess == 1.5
+    assert tuning.Tuning(1e-3, [slow, wrong]).best is slow
+
+
+# ---------------------------------------------------------------- the command
+
+@pytest.fixture
+def files(small, tmp_path):
+    """Paths of SYSTEM.xml, STATE.xml and INTEGRATOR.xml of the small scene."""
+    context, integrator = scenes.makeContext(small, "CPU", temperature=TEMPERATURE, forces=[springs(small)])
+    contents = context.getSystem(), context.getState(positions=True), integrator
+    paths = [tmp_path/name for name in ("system.xml", "state.xml", "integrator.xml")]
+    for path, content in zip(paths, contents):
+        path.write_text(openmm.XmlSerializer.serialize(content))
+    return [str(path) for path in paths]
+
+
+SMALL = ["--rounds", "1", "--property", "Threads=1"]
+
+
+def testCommandWritesTablePictureAndNumbers(files, tmp_path, capsys):
+    out = tmp_path/"a"/"b"
+    arguments = [*files, "--output", str(out), *SMALL, "--tolerances", "1e-1", "1e-3", "1e-5", "--run-length", "5000"]
+    assert accuracy.main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "Hasimoto split" in printed or "Prolate split" in printed
+    assert "Recommended tolerance" in printed and "run of 5000 steps" in printed
+    assert (out/"accuracy.txt").read_text().strip() in printed
+    assert (out/"accuracy.png").read_bytes().startswith(b"\x89PNG")
+    with open(out/"accuracy.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["tolerance"] for row in rows] == ["1e-01", "1e-03", "1e-05"]
+    assert float(rows[2]["error_random"]) < 1e-2*float(rows[0]["error_random"])
+    marked = [line for line in printed.splitlines() if line.endswith("<- recommended")]
+    assert len(marked) == sum(row["recommended"] == "1" for row in rows) <= 1
+
+
+def testOptionsReplaceTheIntegrator(files, tmp_path, capsys):
+    settings = ["--temperature", "0", "--viscosity", "603.4", "--radius", "0.5", "--step", "2"]
+    for start in ([*files[:2], *settings], [*files, "--temperature", "0", "--step", "2"]):
+        scene = command.load(command._parser().parse_args([*start, "--periodic"]))
+        assert (scene.thermalEnergy, scene.stepSize, scene.radius) == (0, 2, 0.5)
+        assert scene.freeMobility == pytest.approx(1/(6*np.pi*603.4*0.5))
+
+
+def testCommandTunes(files, tmp_path, capsys):
+    assert accuracy.main([*files, "--output", str(tmp_path), "--tune", *SMALL]) == 0
+    printed = capsys.readouterr().out
+    assert "<- best" in printed and (tmp_path/"tuning.txt").exists()
+    for line in printed.splitlines():
+        if "setNumericalParameters" in line:
+            settings = ast.literal_eval(line.partition("(")[2].rpartition(")")[0])
+            template().setNumericalParameters(settings)
+            assert settings
+    best = tuning.Candidate("b", {"split": "Hasimoto", "xi": 2.5}, {"xi": 2.5, "gridDimensions": (9, 9, 9),
+                            "windowSupport": 4, "realCutoff": 1.0}, 1e-4, [1.0])
+    slow = tuning.Candidate("automatic", {}, best.parameters, 1e-4, [1.5])
+    lines = report.tuningText(tuning.Tuning(1e-3, [slow, best]))
+    assert "1.50 times" in "\n".join(lines) and "({'split': 'Hasimoto', 'xi': 2.5})" in lines[-1]
+
+
+def testInterruptionLeavesWhatIsKnown(files, tmp_path, capsys, monkeypatch):
+    from openmmpse.accuracy.scene import Probe
+
+    calls, original = [], Probe.secondsPerStep
+
+    def interrupted(self, *arguments, **options):
+        calls.append(1)
+        if len(calls) > 3:
+            raise KeyboardInterrupt
+        return original(self, *arguments, **options)
+
+    monkeypatch.setattr(Probe, "secondsPerStep", interrupted)
+    assert accuracy.main([*files, "--output", str(tmp_path), *SMALL]) == 130
+    printed = capsys.readouterr().out
+    assert "INTERRUPTED" in printed and "1e-01" in printed and "1e-02" in printed and "1e-03  " not in printed
+    assert (tmp_path/"accuracy.png").exists()
+    with open(tmp_path/"accuracy.csv") as file:
+        assert [bool(row["best_s_per_step_without_forces"]) for row in csv.DictReader(file)] == [True, False]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def testSignalEndsTheCommandProperly(files, tmp_path):
+    arguments = [sys.executable, "-m", "openmmpse", "accuracy", *files, "--output", str(tmp_path), "--rounds", "1000000",
+                 "--tolerances", "1e-1"]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    seen = b""
+    while b"timing, round" not in seen:
+        piece = os.read(process.stderr.fileno(), 4096)
+        assert piece, seen
+        seen += piece
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 130 and b"Traceback" not in err and b"INTERRUPTED" in out
+    assert (tmp_path/"accuracy.csv").exists()
+
+
+def testInterruptedBeforeAnything(files, tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(accuracy.sweep, "forceKinds", interrupted)
+    assert accuracy.main([*files, "--output", str(tmp_path/"out"), *SMALL]) == 130
+    assert "before anything was measured" in capsys.readouterr().err
+    monkeypatch.setattr(command, "tune", interrupted)
+    assert accuracy.main([*files, "--tune", "--output", str(tmp_path/"out")]) == 130
+
+
+@pytest.mark.parametrize("change, words", [
+    (lambda f: ["nowhere.xml", *f[1:]], ["nowhere.xml", "does not exist", "System"]),
+    (lambda f: [f[1], f[1], f[2]], ["holds a State", "System is expected"]),
+    (lambda f: [f[0], f[0], f[2]], ["holds a System", "State is expected"]),
+    (lambda f: [*f[:2], f[0]], ["holds a System", "PSEBrownianIntegrator is expected"]),
+    (lambda f: f[:2], ["--temperature, --viscosity, --radius, --step missing", "INTEGRATOR.xml"]),
+    (lambda f: [*f[:2], "--radius", "0.5"], ["--temperature, --viscosity, --step missing"]),
+    (lambda f: [*f, "--platform", "Abacus"], ["'Abacus'", "Reference", "CPU"]),
+    (lambda f: [*f, "--property", "Threads"], ["--property Threads", "NAME=VALUE"]),
+    (lambda f: [*f, "--property", "Colour=2"], ["Colour"]),
+    (lambda f: [*f, "--tolerances", "1e-12"], ["1e-12", "1e-09", "0.1"]),
+    (lambda f: [*f, "--run-length", "0"], ["runLength is 0", "positive"]),
+    (lambda f: [*f, "--correlation-time", "-1"], ["correlationTime is -1", "positive"]),
+    (lambda f: [*f, "--rounds", "0"], ["rounds is 0"]),
+    (lambda f: [*f, "--radius", "-1"], ["radius is -1", "positive"]),
+    (lambda f: [*f, "--tune", "--tolerances", "1e-3", "1e-4"], ["one tolerance", "2 were given"]),
+    (lambda f: [*f, "--tune", "--split", "both"], ["one split"]),
+])  # fmt: skip
+def testBadCommandLines(files, tmp_path, capsys, change, words):
+    assert accuracy.main([*change(files), "--output", str(tmp_path/"out")]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("accuracy: ") and "Traceback" not in message
+    for word in words:
+        assert word in message
+
+
+def testBadFiles(small, files, tmp_path, capsys):
+    bad = tmp_path/"bad.xml"
+
+    def messageFor(content, place):
+        bad.write_text(content if isinstance(content, str) else openmm.XmlSerializer.serialize(content))
+        arguments = [str(bad) if i == place else path for i, path in enumerate(files)]
+        assert accuracy.main(arguments) == 2
+        return capsys.readouterr().err
+
+    context, _ = scenes.makeContext(small, "CPU")
+    assert "holds no positions" in messageFor(context.getState(velocities=True), 1)
+    assert "no XML file" in messageFor("hello", 0)
+    brownian = messageFor(openmm.BrownianIntegrator(300, 1, 1), 2)
+    assert "Integrator; a PSEBrownianIntegrator is expected" in brownian and "--viscosity" in brownian
+    message = messageFor(scenes.makeSystem(small, masses=[0.0]*small.count), 0)
+    assert "none of the 30 particles can move" in message and "mass above 0" in message
+    assert "(30, 3)" in messageFor(scenes.makeSystem(scenes.pair(1.0, 5.0, 0.5)), 0)
+    free = template()
+    free.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
+    assert "FreeDraining" in messageFor(free, 2)
+    unbounded = template()
+    unbounded.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
+    assert "unbounded" in messageFor(unbounded, 2)
+
+
+def testBadScenes(small):
+    system = scenes.makeSystem(small)
+    holes = small.positions.copy()
+    holes[4, 1] = np.nan
+    with pytest.raises(SceneError, match="position of particle 4"):
+        Scene(system, holes, template())
+    with pytest.raises(TypeError, match="needs positions and integrator"):
+        accuracy.measure(system)
+    with pytest.raises(SceneError, match="is a VerletIntegrator"):
+        Scene(system, small.positions, openmm.VerletIntegrator(1.0))
+    singular = openmm.CustomExternalForce("sqrt(x-1000)")
+    singular.addParticle(3, [])
+    with pytest.raises(SceneError, match="force on particle 3.*relax"):
+        accuracy.measure(sceneOf(small, forces=[singular]), rounds=1)
+    many = openmm.System()
+    many.setDefaultPeriodicBoxVectors(*np.eye(3)*60)
+    for _ in range(2001):
+        many.addParticle(1)
+    with pytest.raises(SceneError, match="2001 particles.*Reference.*2000.*CPU"):
+        Scene(many, np.zeros((2001, 3)), template(), platform="Reference")
+
+
+def testItIsExported():
+    assert openmmpse.accuracy.measure is accuracy.sweep.measure
