@@ -9,44 +9,23 @@ import itertools
 import time
 
 import numpy as np
-import openmm
-from openmm import unit
 
-import openmmpse
-from openmmpse import PSEBrownianIntegrator
+import scenes
+
+STEP = 1e-6  # ps: so short that the neighbour list is built once, because its price does not depend on xi alone
 
 
 def scene(numParticles, phi, tolerance, temperature, xi):
-    """A jittered lattice of spheres of radius 1 nm in a cube, on one thread of the CPU platform."""
-    length = (numParticles*4/3*np.pi/phi)**(1/3)
-    system = openmm.System()
-    system.setDefaultPeriodicBoxVectors(*(np.eye(3)*length))
-    for _ in range(numParticles):
-        system.addParticle(1.0)
-    # steps so short that the neighbour list is built once: its price does not depend on xi alone
-    integrator = PSEBrownianIntegrator(temperature, 600.0, 1.0, 1e-6)
-    integrator.setErrorTolerance(tolerance)
-    integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
-    integrator.setRandomNumberSeed(1)
-    if xi:
-        integrator.setSplittingParameter(xi)
-    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": "1"})
-    side = int(np.ceil(numParticles**(1/3)))
-    cells = np.array(list(itertools.islice(itertools.product(range(side), repeat=3), numParticles)))
-    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, cells.shape)
-    context.setPositions((cells + 0.5 + jitter)*length/side)
-    return context, integrator
+    """A jittered lattice of spheres on one thread of the CPU platform, with an automatic xi if xi is None."""
+    positions, length = scenes.lattice(numParticles, phi)
+    parameters = {"xi": xi} if xi else None
+    return scenes.hydrodynamic(scenes.makeSystem(numParticles, length), positions, tolerance, temperature, threads=1,
+                               parameters=parameters, step=STEP)
 
 
-def stepTime(integrator, repeats=4):
+def stepTime(integrator):
     """Processor time of one step in ns, the best of a few, after warming up."""
-    integrator.step(2)
-    best = np.inf
-    for _ in range(repeats):
-        start = time.process_time()
-        integrator.step(2)
-        best = min(best, (time.process_time() - start)/2)
-    return best*1e9
+    return 1e9*scenes.secondsPerStep([integrator], steps=2, rounds=4, clock=time.process_time)[0]
 
 
 def features(numParticles, phi, parameters):

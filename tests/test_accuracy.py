@@ -155,6 +155,32 @@ def testBoxOfTheStateIsUsed(small):
     forces = scenes.randomForces(dilute)
     assert scenes.errorRatio(scene.probe(1e-4).velocities(forces), dilute.velocities(forces), forces, dilute) < 1e-4
     assert system.getDefaultPeriodicBoxVectors()[0][0]._value == pytest.approx(small.box[0, 0])
+    assert scene.system.getDefaultPeriodicBoxVectors()[0][0]._value == pytest.approx(wide[0, 0])
+
+
+def testStepsWithoutForcesDoTheWorkOfTheFluid(small):
+    """They move a particle that nothing of the System pulls, and leave the System alone."""
+    context, integrator = scenes.makeContext(small, "CPU", forces=[springs(small)])
+    system = context.getSystem()
+    scene = Scene(system, small.positions, template(0, small.radius))
+    assert system.getNumForces() == 1 and scene.system.getNumForces() == 2 and scene.timingGroup == 30
+    probe = scene.probe(1e-3)
+    assert np.allclose(probe.forces(), context.getState(forces=True).getForces(asNumpy=True)._value)
+    positions = {}
+    for withForces in (True, False):
+        assert probe.secondsPerStep(1e-9, withForces) > 0
+        positions[withForces] = scenes.positionsOf(probe.context) - small.positions
+    flow = small.mobility[:, 0].reshape(-1, 3)  # of a force of 1 kJ/(mol nm) along x on the first particle
+    moved = positions[False]
+    assert np.linalg.norm(moved/np.linalg.norm(moved) - flow/np.linalg.norm(flow)) < 1e-3
+    assert np.linalg.norm(positions[True]) > 10*np.linalg.norm(moved)
+    for i in range(32):
+        force = springs(small)
+        force.setForceGroup(i)
+        system.addForce(force)
+    full = Scene(system, small.positions, template(0, small.radius))
+    assert full.timingGroup is None and full.probe(1e-2).secondsPerStep(1e-9, False) is None
+    assert accuracy.measure(full, rounds=1, tolerances=(1e-2,)).rows[0].bareSeconds is None
 
 
 def testTightRunThatTakesTooLongIsLoosened(small):

@@ -13,6 +13,7 @@ from openmm import unit
 from openmmpse import PSEBrownianIntegrator, plugins
 from openmmpse.conversion import FORCE_UNIT, VISCOSITY_UNIT
 
+LAST_GROUP = 30  #: force groups are bits of an int
 LONG_STEP = 5.0  #: seconds; such steps are timed one at a time
 MOST_FOR_REFERENCE = 2000  #: particles; direct sums over modes take seconds a step there
 BOLTZMANN = (unit.BOLTZMANN_CONSTANT_kB * unit.AVOGADRO_CONSTANT_NA).value_in_unit(
@@ -40,9 +41,9 @@ class Scene:
 
     def __init__(self, system, positions, integrator, box=None, platform="CPU", properties=None):
         self.box = _box(system.getDefaultPeriodicBoxVectors() if box is None else box)
-        self.system = _inBox(system, self.box)
         self.positions = _positions(positions, system.getNumParticles())
         self.mobile = np.array([system.getParticleMass(i)._value > 0 for i in range(system.getNumParticles())])
+        self.system, self.timingGroup = _prepared(system, self.box, self.mobile)
         self.platform, self.properties = _platform(platform), dict(properties or {})
         self._template = _template(integrator)
         #: numerical parameters that the user's integrator prescribes; measurements leave them automatic
@@ -129,8 +130,11 @@ class Probe:
         platform = openmm.Platform.getPlatform(scene.platform)
         self.context = openmm.Context(scene.system, integrator, platform, scene.properties)
         self.place(scene.positions)
-        self._groups = integrator.getIntegrationForceGroups()
         self._warm = False
+        self._groups = integrator.getIntegrationForceGroups()
+        if scene.timingGroup is not None:
+            self._groups &= ~(1 << scene.timingGroup)
+        integrator.setIntegrationForceGroups(self._groups)
 
     @property
     def parameters(self):
@@ -163,9 +167,15 @@ class Probe:
         return values
 
     def secondsPerStep(self, seconds, withForces=True):
-        """Wall-clock time of one step from the positions of the scene, over about `seconds`; 1 to 100 steps."""
+        """Wall-clock time of one step from the positions of the scene, over about `seconds`; 1 to 100 steps.
+
+        withForces  whether the Forces of the System are evaluated; without them, the fluid does all its work for one
+                    force on one particle. None if the System leaves no force group free for that.
+        """
+        if not withForces and self.scene.timingGroup is None:
+            return None
         self.place(self.scene.positions)
-        self.integrator.setIntegrationForceGroups(self._groups if withForces else 0)
+        self.integrator.setIntegrationForceGroups(self._groups if withForces else 1 << self.scene.timingGroup)
         try:
             first = self._time(1)
             if not self._warm:
@@ -202,13 +212,22 @@ def _box(vectors):
     return np.array([[float(getattr(x, "_value", x)) for x in getattr(v, "_value", v)] for v in values])
 
 
-def _inBox(system, box):
-    """The System, or a copy of it if its default box is another one: numerical parameters are chosen for that."""
-    if np.allclose(_box(system.getDefaultPeriodicBoxVectors()), box, rtol=1e-6):
-        return system
+def _prepared(system, box, mobile):
+    """(copy of the System, group): in that box, which numerical parameters are chosen for, and with a Force to time with.
+
+    That Force pulls on one particle and is alone in its group, so that a step with this group alone costs what the fluid
+    costs: a step without any force would skip part of that. The group is None if the System uses all of them.
+    """
+    used = {force.getForceGroup() for force in system.getForces()}
     system = copy.deepcopy(system)
     system.setDefaultPeriodicBoxVectors(*(openmm.Vec3(*row) for row in box))
-    return system
+    group = next((g for g in range(LAST_GROUP, -1, -1) if g not in used), None)
+    if group is not None and np.any(mobile):
+        pull = openmm.CustomExternalForce("-x")
+        pull.addParticle(int(np.argmax(mobile)), [])
+        pull.setForceGroup(group)
+        system.addForce(pull)
+    return system, group
 
 
 def _prescribed(integrator):

@@ -203,7 +203,9 @@ class Sweep:
 
     def _clock(self, probe, row):
         row.times.append(probe.secondsPerStep(ROUND_SECONDS))
-        row.bareTimes.append(probe.secondsPerStep(ROUND_SECONDS, withForces=False))
+        bare = probe.secondsPerStep(ROUND_SECONDS, withForces=False)
+        if bare is not None:
+            row.bareTimes.append(bare)
         row.stages = stages.shares(probe.integrator.describe())
         row.parameters = probe.parameters
 

@@ -23,7 +23,7 @@ class Candidate:
     settings: dict  #: for setNumericalParameters(); empty: automatic
     parameters: dict = field(default_factory=dict)  #: in use
     error: float = 0.0  #: of M f for random forces, as in `Row.errors`
-    times: list = field(default_factory=list)  #: seconds of a step without Forces
+    times: list = field(default_factory=list)  #: seconds of a step, without the System's Forces where possible
 
     @property
     def seconds(self):
@@ -84,7 +84,7 @@ def tune(source, positions=None, integrator=None, *, box=None, platform=None, pr
         running.append((probe, candidate))
     for number in range(int(rounds)):
         for i, (probe, candidate) in enumerate(running):
-            candidate.times.append(probe.secondsPerStep(ROUND_SECONDS, withForces=False))
+            candidate.times.append(probe.secondsPerStep(ROUND_SECONDS, withForces=scene.timingGroup is None))
             if progress:
                 progress(f"tuning, round {number + 1} of {rounds}", (number + (i + 1) / len(running)) / rounds)
     return tuning
