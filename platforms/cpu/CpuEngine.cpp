@@ -104,7 +104,7 @@ template <class Real> void CpuEngine<Real>::addFromPlaces(Real s, const Vector& 
 
 template <class Real> void CpuEngine<Real>::addRealForced() {
     const std::vector<int>& order = realSpace.order();
-    inPlaces.resize(scaledForces.size());
+    Vector& inPlaces = realSpace.basis(0); // free for this use until Lanczos begins
     part.resize(scaledForces.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
@@ -118,13 +118,12 @@ template <class Real> void CpuEngine<Real>::addRealForced() {
 template <class Real> void CpuEngine<Real>::addRealThermal(const Thermal& thermal, Real noise) {
     const std::vector<int>& order = realSpace.order();
     Vector& z = realSpace.basis(0);
-    particles.resize(order.size());
     part.resize(z.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
+        uint32_t particles[Threads::BLOCK]; // indices in the System
         for (int place = from; place < to; place++)
-            particles[place] = static_cast<uint32_t>(indices[order[place]]);
-        noiseLoops.particleNoise(thermal.real, particles.data() + from, to - from,
-                                 z.data() + 3 * size_t(from));
+            particles[place - from] = static_cast<uint32_t>(indices[order[place]]);
+        noiseLoops.particleNoise(thermal.real, particles, to - from, z.data() + 3 * size_t(from));
     });
     iterations =
         lanczosSquareRoot(realSpace, part, lanczosTolerance, negativeTolerance, reorthogonalise);

@@ -41,8 +41,7 @@ private:
     WaveKernels<Real> noiseLoops = waveKernels<Real>();
     std::vector<numerics::Vec3> fractions;
     Vector scaledForces, velocities; ///< [n][3] by particle
-    Vector inPlaces, part;           ///< [n][3] by place of the real-space half
-    std::vector<uint32_t> particles; ///< index in the System, by place
+    Vector part;                     ///< [n][3] by place of the real-space half
     int iterations = 0;
 };
 

@@ -56,7 +56,7 @@ constexpr int MOST_CELLS = 4;
 template <class Real>
 CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads)
     : box(box), a(plan.a), range(plan.realCutoff), sumImages(plan.sumImages), threads(threads),
-      workspaces(threads.count()) {
+      candidateRoom(threads.count()) {
     const Matrix3& v = box.vectors();
     tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
     for (int d = 0; d < 3; d++)
@@ -119,44 +119,46 @@ template <class Real> void CpuRealSpace<Real>::sortByCell(const std::vector<Vec3
 }
 
 /** The runs of places, at most two for each column of cells, that hold all neighbours of s. */
-template <class Real>
-void CpuRealSpace<Real>::findRuns(const Vec3& s, std::vector<PairRun>& runs) const {
-    runs.clear();
+template <class Real> int CpuRealSpace<Real>::findRuns(const Vec3& s, PairRun* runs) const {
     const CellInterval x(s[0], reach[0], cellCount[0]), y(s[1], reach[1], cellCount[1]),
         z(s[2], reach[2], cellCount[2]);
-    const int end = z.from + z.number;
+    const int end = z.from + z.number, last = std::min(end, cellCount[2]),
+              wrapped = std::max(end - cellCount[2], 0);
     double y2[MOST_CELLS];
     for (int j = 0; j < y.number; j++)
         y2[j] = y.squaredDistance(j, s[1], width[1]);
+    int n = 0;
     for (int i = 0; i < x.number; i++) {
-        const double x2 = x.squaredDistance(i, s[0], width[0]);
+        const double left = range * range - x.squaredDistance(i, s[0], width[0]);
+        const int* const row = cellStart.data() + size_t(x.cell(i)) * cellCount[1] * cellCount[2];
         for (int j = 0; j < y.number; j++) {
-            if (!tilted && x2 + y2[j] >= range * range)
+            if (!tilted && y2[j] >= left)
                 continue; // a corner column that is out of range
-            const int column = x.cell(i) * cellCount[1] + y.cell(j);
-            const int* start = cellStart.data() + size_t(column) * cellCount[2];
-            runs.push_back({start[z.from], start[std::min(end, cellCount[2])]});
-            if (end > cellCount[2])
-                runs.push_back({start[0], start[end - cellCount[2]]});
+            const int* const start = row + y.cell(j) * cellCount[2];
+            runs[n++] = {start[z.from], start[last]};
+            if (wrapped > 0)
+                runs[n++] = {start[0], start[wrapped]};
         }
     }
+    return n;
 }
 
 template <class Real>
 void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3>& fractions) {
     const PairPolynomials<Real> table = polynomials();
     const PairGeometry<Real> positions = geometry();
-    Workspace& work = workspaces[thread];
+    std::vector<int32_t>& scratch = candidateRoom[thread];
+    PairRun runs[2 * MOST_CELLS * MOST_CELLS];
     std::vector<PairBlock<Real>>& mine = blocks[task];
     const int from = Threads::from(task), to = Threads::to(task, static_cast<int>(rowStart.size()));
     int used = 0;
     for (int i = from; i < to; i++) {
-        findRuns(fractions[particleAt[i]], work.runs);
+        const int numRuns = findRuns(fractions[particleAt[i]], runs);
         size_t candidates = PAIR_LANES;
-        for (const PairRun& run : work.runs)
-            candidates += run.end - run.begin;
-        if (work.neighbours.size() < candidates)
-            work.neighbours.resize(candidates);
+        for (int r = 0; r < numRuns; r++)
+            candidates += runs[r].end - runs[r].begin;
+        if (scratch.size() < candidates)
+            scratch.resize(candidates);
         const size_t needed = used + candidates / PAIR_LANES;
         if (mine.size() < needed) {
             const double likely = ROOM * used / (i - from + 1) * (to - from);
@@ -164,9 +166,8 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
             mine.resize(mine.capacity());
         }
         rowStart[i] = used;
-        rowCount[i] = kernels.fillRow(positions, table, i, work.runs.data(),
-                                      static_cast<int>(work.runs.size()), work.neighbours.data(),
-                                      mine.data() + used);
+        rowCount[i] =
+            kernels.fillRow(positions, table, i, runs, numRuns, scratch.data(), mine.data() + used);
         used += rowCount[i];
     }
 }

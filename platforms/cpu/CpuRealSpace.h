@@ -48,18 +48,12 @@ private:
     void sortByCell(const std::vector<numerics::Vec3>& fractions);
     void fillRows(const std::vector<numerics::Vec3>& fractions);
     void fillRowsOf(int task, int thread, const std::vector<numerics::Vec3>& fractions);
-    void findRuns(const numerics::Vec3& s, std::vector<PairRun>& runs) const;
+    int findRuns(const numerics::Vec3& s, PairRun* runs) const;
     void fillRowsWithImages(const std::vector<numerics::Vec3>& fractions);
     PairPolynomials<Real> polynomials() const;
     PairGeometry<Real> geometry() const;
     PairRows<Real> rows(int task) const;
     template <class Work> double sumOverTasks(Work work) const;
-
-    /** What a thread needs to fill rows. */
-    struct Workspace {
-        std::vector<PairRun> runs;
-        std::vector<int32_t> neighbours;
-    };
 
     numerics::Lattice box;
     double a, range;
@@ -75,7 +69,7 @@ private:
     std::vector<typename PairCoordinate<Real>::Type> axes[3];
     std::vector<std::vector<PairBlock<Real>>> blocks; ///< one array per task of Threads::runBlocks
     std::vector<int32_t> rowStart, rowCount;          ///< [n], in the blocks of the row's task
-    std::vector<Workspace> workspaces;                ///< one per thread
+    std::vector<std::vector<int32_t>> candidateRoom;  ///< one per thread
     std::deque<Vector> krylov;
     mutable std::vector<double> partial;
 };

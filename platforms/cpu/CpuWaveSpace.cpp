@@ -108,10 +108,14 @@ template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Ve
     const int n = static_cast<int>(fractions.size());
     columnOf.resize(n);
     first.resize(3 * n);
-    offsets.resize(3 * n);
     weights.resize(3 * size_t(n) * padded);
-    // The window of a particle at u, in grid units, begins at ceil(u - P/2).
-    const auto begin = [&](double u) { return static_cast<int>(std::ceil(u - 0.5 * support)); };
+    // The window of a particle at u, in grid units, begins at ceil(u - P/2). Truncation is in line
+    // on every machine, std::ceil a call.
+    const auto begin = [&](double u) {
+        const double shifted = u + 0.5 * support; // positive
+        const int below = static_cast<int>(shifted);
+        return below + (below < shifted) - support;
+    };
     const auto wrapped = [&](int d, int i) { return i < 0 ? i + size[d] : i; };
     threads.runBlocks(n, [&](int from, int to, int) {
         for (int i = from; i < to; i++)
@@ -121,13 +125,14 @@ template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Ve
     sortByKey(columnOf, size[0] * size[1], columnStart, order);
     const WindowPolynomials<Real> window = {windowDegree, padded, windowCoefficients.data()};
     threads.runBlocks(n, [&](int from, int to, int) {
+        Real offsets[3 * Threads::BLOCK];
         for (int slot = from; slot < to; slot++)
             for (int d = 0; d < 3; d++) {
                 const double u = fractions[order[slot]][d] * size[d];
                 first[3 * slot + d] = wrapped(d, begin(u));
-                offsets[3 * slot + d] = Real(2 * (begin(u) - u) + support - 1);
+                offsets[3 * (slot - from) + d] = Real(2 * (begin(u) - u) + support - 1);
             }
-        gridLoops.evaluateWindows(window, offsets.data() + 3 * from, to - from,
+        gridLoops.evaluateWindows(window, offsets, to - from,
                                   weights.data() + 3 * size_t(from) * padded);
     });
 }
@@ -135,24 +140,24 @@ template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Ve
 template <class Real> GridParticles<Real> CpuWaveSpace<Real>::particles() const {
     return {support,      padded,         {size[0], size[1], size[2]},
             rowLength,    planeLength,    columnStart.data(),
-            first.data(), weights.data(), sortedForces.data()};
+            first.data(), weights.data(), sorted.data()};
 }
 
 template <class Real> void CpuWaveSpace<Real>::spread(const Real* forces) {
     const int n = static_cast<int>(order.size());
-    sortedForces.resize(3 * order.size());
+    sorted.resize(3 * order.size());
     threads.runBlocks(n, [&](int from, int to, int) {
         for (int slot = from; slot < to; slot++)
             for (int c = 0; c < 3; c++)
-                sortedForces[3 * size_t(slot) + c] = forces[3 * size_t(order[slot]) + c];
+                sorted[3 * size_t(slot) + c] = forces[3 * size_t(order[slot]) + c];
     });
-    const GridParticles<Real> sorted = particles();
+    const GridParticles<Real> placed = particles();
     // A plane belongs to one task, which adds the particles in their order: no two threads write
     // one number.
     threads.run(size[0], [&](int x, int thread) {
         Real* const own = scratch[thread]->begin();
         Real* const planes[3] = {own, own + planeLength, own + 2 * planeLength};
-        gridLoops.spreadPlane(sorted, x, planes);
+        gridLoops.spreadPlane(placed, x, planes);
         for (int c = 0; c < 3; c++)
             fft->planeForward(planes[c], own + 3 * planeLength, grids[c].begin() + x * planeLength);
     });
@@ -204,14 +209,14 @@ template <class Real> void CpuWaveSpace<Real>::gather(Real* u) {
             }
         }
     });
-    sortedVelocities.resize(3 * order.size());
-    const GridParticles<Real> sorted = particles();
+    sorted.resize(3 * order.size());
+    const GridParticles<Real> placed = particles();
     const Real* data[3] = {grids[0].begin(), grids[1].begin(), grids[2].begin()};
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
-        gridLoops.gatherVelocities(sorted, from, to, data, sortedVelocities.data());
+        gridLoops.gatherVelocities(placed, from, to, data, sorted.data());
         for (int slot = from; slot < to; slot++)
             for (int c = 0; c < 3; c++)
-                u[3 * size_t(order[slot]) + c] += sortedVelocities[3 * size_t(slot) + c];
+                u[3 * size_t(order[slot]) + c] += sorted[3 * size_t(slot) + c];
     });
 }
 

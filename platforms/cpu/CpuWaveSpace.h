@@ -64,7 +64,8 @@ private:
     /// per thread: four planes, or three blocks of columns
     std::vector<std::unique_ptr<FftArray<Real>>> scratch;
     std::vector<int> order, columnOf, columnStart, first;
-    std::vector<Real> offsets, weights, sortedForces, sortedVelocities;
+    std::vector<Real> weights;
+    std::vector<Real> sorted; ///< forces, later velocities, in the order of columns
 };
 
 } // namespace PSE

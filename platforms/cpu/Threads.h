@@ -52,8 +52,9 @@ public:
     static int from(int block) { return block * BLOCK; }
     static int to(int block, int n) { return n < (block + 1) * BLOCK ? n : (block + 1) * BLOCK; }
 
-private:
     static constexpr int BLOCK = 256;
+
+private:
     OpenMM::ThreadPool& pool;
     bool serial;
 };
