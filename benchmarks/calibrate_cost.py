@@ -59,7 +59,7 @@ def main():
     print("SPREAD %.2f  GRID %.1f  PAIR_BUILD %.1f  PAIR_APPLY %.2f" % tuple(constants))
     print("model/measured: %.2f .. %.2f" % ((relative @ constants).min(), (relative @ constants).max()))
     for phi, tolerance, xi, milliseconds, excess in best:
-        print(f"phi {phi} tolerance {tolerance}: automatic xi {xi:.3f}, ms per step at 0.6 .. 1.6 of it {milliseconds}, "
+        print(f"phi {phi} tolerance {tolerance:g}: automatic xi {xi:.3f}, ms/step at 0.6 .. 1.6 of it {milliseconds}, "
               f"automatic/best {excess:.2f}")
 
 

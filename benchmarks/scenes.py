@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Scenes that the benchmarks share: spheres of 1 nm in water, as suspensions and as gels, and how steps of them are timed."""
+"""Scenes that the benchmarks share, spheres of 1 nm in water as suspensions and as gels, and how they are timed."""
+
 import functools
 import time
 
@@ -9,46 +10,47 @@ import openmm
 from openmmpse import PSEBrownianIntegrator
 
 RADIUS, VISCOSITY, TEMPERATURE, MASS = 1.0, 600.0, 300.0, 100.0  # nm, Da/(nm ps), K, Da
-DRAG = 6*np.pi*VISCOSITY*RADIUS
-KT = 0.00831446261815324*TEMPERATURE
-STEP = 1e-3*RADIUS**2*DRAG/KT  # ps; dt D0/a^2 = 1e-3, so that neighbour lists age as they do in real runs
+DRAG = 6 * np.pi * VISCOSITY * RADIUS
+KT = 0.00831446261815324 * TEMPERATURE
+STEP = 1e-3 * RADIUS**2 * DRAG / KT  # ps; dt D0/a^2 = 1e-3, so that neighbour lists age as they do in real runs
 TILE = 130_000  # particles; larger suspensions are periodic repetitions of smaller ones
 GEL_TILE = 2000
 
 
 # ---------------------------------------------------------------- configurations
 
+
 def edge(numParticles, phi):
     """Edge of the cube (nm) that the spheres fill to the volume fraction phi."""
-    return (numParticles*4/3*np.pi*RADIUS**3/phi)**(1/3)
+    return (numParticles * 4 / 3 * np.pi * RADIUS**3 / phi) ** (1 / 3)
 
 
 def lattice(numParticles, phi):
     """Positions (N, 3) on a jittered cubic lattice in random order, without overlaps up to phi = 0.5, and the edge."""
     length = edge(numParticles, phi)
-    side = int(np.ceil(numParticles**(1/3) - 1e-9))
+    side = int(np.ceil(numParticles ** (1 / 3) - 1e-9))
     rng = np.random.default_rng(0)
-    cells = np.stack(np.unravel_index(rng.choice(side**3, numParticles, replace=False), (side,)*3), axis=1)
-    jitter = rng.uniform(-0.5, 0.5, cells.shape)*max(0.0, 1 - 2*RADIUS*side/length)
-    return (cells + 0.5 + jitter)*length/side, length
+    cells = np.stack(np.unravel_index(rng.choice(side**3, numParticles, replace=False), (side,) * 3), axis=1)
+    jitter = rng.uniform(-0.5, 0.5, cells.shape) * max(0.0, 1 - 2 * RADIUS * side / length)
+    return (cells + 0.5 + jitter) * length / side, length
 
 
 @functools.lru_cache(maxsize=4)
 def suspension(numParticles, phi):
-    """Positions (N, 3) of a random suspension without order and (up to 0.1 % of a radius) without overlaps, and the edge.
+    """Positions (N, 3) of a random suspension without overlaps (up to 0.1 % of a radius), and the edge.
 
     Independent positions whose overlaps are pushed apart. Above TILE particles an eighth of them is repeated.
     """
     if numParticles > TILE:
-        return _repeated(*suspension(numParticles//8, phi))
+        return _repeated(*suspension(numParticles // 8, phi))
     length = edge(numParticles, phi)
     rng = np.random.default_rng(1)
-    x = rng.random((numParticles, 3))*length
+    x = rng.random((numParticles, 3)) * length
     for _ in range(1000):
-        i, j, r, distance = contacts(x, length, 2.02*RADIUS)
-        if not len(i) or distance.min() > 1.999*RADIUS:
+        i, j, r, distance = contacts(x, length, 2.02 * RADIUS)
+        if not len(i) or distance.min() > 1.999 * RADIUS:
             break
-        push = (0.5*(2.03*RADIUS - distance)/distance)[:, None]*r
+        push = (0.5 * (2.03 * RADIUS - distance) / distance)[:, None] * r
         np.add.at(x, i, push)
         np.subtract.at(x, j, push)
         x %= length
@@ -65,24 +67,24 @@ def gel(numParticles, phi):
     became one cluster are repeated; numParticles is that many times a power of 8.
     """
     if numParticles > GEL_TILE:
-        return _repeated(*gel(numParticles//8, phi))
+        return _repeated(*gel(numParticles // 8, phi))
     length = edge(numParticles, phi)
     x, _ = suspension(numParticles, min(phi, 0.1))
-    x = x*(length/edge(numParticles, min(phi, 0.1)))
+    x = x * (length / edge(numParticles, min(phi, 0.1)))
     rng = np.random.default_rng(2)
     labels = np.arange(numParticles)
-    reach, bond = 3*RADIUS, 0.1*RADIUS  # seen around a sphere; longest gap of a bond
+    reach, bond = 3 * RADIUS, 0.1 * RADIUS  # seen around a sphere; longest gap of a bond
     for _ in range(100_000):
-        i, j, _, distance = contacts(x, length, 2*RADIUS + reach)
-        labels, foreign = _joined(labels, i, j, distance - 2*RADIUS, bond)
+        i, j, _, distance = contacts(x, length, 2 * RADIUS + reach)
+        labels, foreign = _joined(labels, i, j, distance - 2 * RADIUS, bond)
         count = labels.max() + 1
         if count == 1:
             break
         free = np.full(count, reach)
-        np.minimum.at(free, labels[i[foreign]], distance[foreign] - 2*RADIUS)
-        np.minimum.at(free, labels[j[foreign]], distance[foreign] - 2*RADIUS)
+        np.minimum.at(free, labels[i[foreign]], distance[foreign] - 2 * RADIUS)
+        np.minimum.at(free, labels[j[foreign]], distance[foreign] - 2 * RADIUS)
         direction = rng.normal(size=(count, 3))
-        direction *= (0.5*np.maximum(free, bond)/np.linalg.norm(direction, axis=1))[:, None]
+        direction *= (0.5 * np.maximum(free, bond) / np.linalg.norm(direction, axis=1))[:, None]
         x = (x + direction[labels]) % length
     return x, length
 
@@ -91,6 +93,7 @@ def _joined(labels, i, j, gaps, bond):
     """Labels 0, 1, ... of clusters after bonding all pairs with a small gap, and which pairs are of two clusters."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
+
     near = gaps <= bond
     count = labels.max() + 1
     graph = coo_matrix((np.ones(near.sum()), (labels[i[near]], labels[j[near]])), shape=(count, count))
@@ -101,28 +104,30 @@ def _joined(labels, i, j, gaps, bond):
 def contacts(x, length, distance):
     """Pairs (i, j) closer than a distance in a periodic cube, r_ij = x_i - x_j and its length."""
     from scipy.spatial import cKDTree
+
     pairs = cKDTree(x, boxsize=length).query_pairs(distance, output_type="ndarray")
     i, j = pairs[:, 0], pairs[:, 1]
     r = x[i] - x[j]
-    r -= length*np.rint(r/length)
+    r -= length * np.rint(r / length)
     return i, j, r, np.maximum(np.linalg.norm(r, axis=1), 1e-9)
 
 
 def _repeated(x, length):
     """Twice in each direction, in random order."""
-    shifts = length*np.stack(np.meshgrid(*[[0, 1]]*3, indexing="ij"), -1).reshape(-1, 1, 3)
-    return np.random.default_rng(3).permutation((x + shifts).reshape(-1, 3)), 2*length
+    shifts = length * np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
+    return np.random.default_rng(3).permutation((x + shifts).reshape(-1, 3)), 2 * length
 
 
 def fractalDimension(x, length, inner, outer):
     """Slope of log(spheres within r of a sphere) against log r between two distances (nm)."""
     radii = np.geomspace(inner, outer, 8)
     _, _, _, distance = contacts(x, length, outer)
-    within = [1 + 2*np.count_nonzero(distance <= r)/len(x) for r in radii]
+    within = [1 + 2 * np.count_nonzero(distance <= r) / len(x) for r in radii]
     return np.polyfit(np.log(radii), np.log(within), 1)[0]
 
 
 # ---------------------------------------------------------------- Contexts and times
+
 
 def makeSystem(numParticles, length, repulsion=False):
     """An openmm.System of spheres in a cube, with a WCA repulsion if asked for.
@@ -131,13 +136,13 @@ def makeSystem(numParticles, length, repulsion=False):
     half of the fluid's work.
     """
     system = openmm.System()
-    system.setDefaultPeriodicBoxVectors(*(np.eye(3)*length))
+    system.setDefaultPeriodicBoxVectors(*(np.eye(3) * length))
     for _ in range(numParticles):
         system.addParticle(MASS)
     if repulsion:
-        force = openmm.CustomNonbondedForce(f"4*{KT}*(s^12-s^6)+{KT}; s={2*RADIUS/2**(1/6)}/r")
+        force = openmm.CustomNonbondedForce(f"4*{KT}*(s^12-s^6)+{KT}; s={2 * RADIUS / 2 ** (1 / 6)}/r")
         force.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
-        force.setCutoffDistance(2*RADIUS)
+        force.setCutoffDistance(2 * RADIUS)
         for _ in range(numParticles):
             force.addParticle([])
     else:
@@ -147,8 +152,9 @@ def makeSystem(numParticles, length, repulsion=False):
     return system
 
 
-def hydrodynamic(system, positions, tolerance=1e-3, temperature=TEMPERATURE, threads=2, split=None, parameters=None,
-                 step=STEP):
+def hydrodynamic(
+    system, positions, tolerance=1e-3, temperature=TEMPERATURE, threads=2, split=None, parameters=None, step=STEP
+):
     """A Context on the CPU platform with positions set, and its PSEBrownianIntegrator."""
     integrator = PSEBrownianIntegrator(temperature, VISCOSITY, RADIUS, step)
     integrator.setErrorTolerance(tolerance)
@@ -170,12 +176,12 @@ def context(system, positions, integrator, threads):
 
 def secondsPerStep(integrators, steps=5, rounds=5, clock=time.perf_counter):
     """Best time of a step of each integrator, measured in turns so that a noisy moment hits all alike."""
-    best = [np.inf]*len(integrators)
+    best = [np.inf] * len(integrators)
     for integrator in integrators:
         integrator.step(min(3, steps))
     for _ in range(rounds):
         for i, integrator in enumerate(integrators):
             start = clock()
             integrator.step(steps)
-            best[i] = min(best[i], (clock() - start)/steps)
+            best[i] = min(best[i], (clock() - start) / steps)
     return best

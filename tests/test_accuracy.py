@@ -43,7 +43,8 @@ def small():
 def sceneOf(small, platformName="CPU", temperature=TEMPERATURE, forces=None, masses=None):
     system = scenes.makeSystem(small, [springs(small)] if forces is None else forces, masses)
     options = scenes.platformOptions(platformName, 1)
-    return Scene(system, small.positions, template(temperature, small.radius), platform=platformName, properties=options)
+    integrator = template(temperature, small.radius)
+    return Scene(system, small.positions, integrator, platform=platformName, properties=options)
 
 
 # ---------------------------------------------------------------- the sweep
@@ -85,7 +86,7 @@ def testNoiseIsCovarianceErrorPlusTwiceTheLanczosError(small, platformName):
 
 
 def testNoiseNumberBoundsTheMeasuredCovariance():
-    """Overlapping particles, a large real half and a Lanczos process stopped after two iterations: its share is visible."""
+    """Overlapping particles, a large real half, Lanczos stopped after two iterations: its share is visible."""
     gas = scenes.idealGas(20, 1.0, scenes.cube(1), 0.5, seed=2)
     scene = sceneOf(gas, forces=[])
     used = scene.probe(1e-2, parameters={"xi": 0.5}).parameters
@@ -97,7 +98,7 @@ def testNoiseNumberBoundsTheMeasuredCovariance():
     bound = np.linalg.norm(scenes.mobilityColumns(probe.integrator, gas.count) - gas.mobility)/size + 2*lanczos
     draws = probe.displacements(10000).reshape(10000, -1)/np.sqrt(2*KT*STEP)
     difference = np.linalg.norm(draws.T @ draws/len(draws) - gas.mobility)/size
-    # of exact noise E|C - M|^2 = (tr M^2 + (tr M)^2)/n, and 1.5 times its root is beyond chance (it is a sum of thousands)
+    # of exact noise E|C - M|^2 = (tr M^2 + (tr M)^2)/n, and 1.5 times its root is beyond chance (a sum of thousands)
     chance = 1.5*np.sqrt((size**2 + np.trace(gas.mobility)**2)/len(draws))/size
     assert chance < 0.15 and difference < bound + chance < 0.35
 
@@ -292,8 +293,8 @@ def testMeanLengthIsFreeOfTheBiasOfNoise():
 # ---------------------------------------------------------------- what describe() says
 
 def testStagesAreReadFromTheDescription(small, platformName):
-    text = "fluid: periodic 50 %\ncost of the steps so far, without the Forces: waves (noise, scaling) 60 %, b 39 %, c 1 %\n"
-    assert stages.shares(text) == {"waves (noise, scaling)": 0.6, "b": 0.39, "c": 0.01}
+    text = "fluid: periodic 50 %\ncost of the steps so far, without the Forces: waves (a, b) 60 %, b 39 %, c 1 %\n"
+    assert stages.shares(text) == {"waves (a, b)": 0.6, "b": 0.39, "c": 0.01}
     probe = sceneOf(small, platformName).probe(1e-3)
     assert stages.shares(probe.integrator.describe()) == {}
     probe.integrator.step(3)
@@ -408,8 +409,8 @@ def testInterruptionLeavesWhatIsKnown(files, tmp_path, capsys, monkeypatch):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def testSignalEndsTheCommandProperly(files, tmp_path):
-    arguments = [sys.executable, "-m", "openmmpse", "accuracy", *files, "--output", str(tmp_path), "--rounds", "1000000",
-                 "--tolerances", "1e-1"]
+    arguments = [sys.executable, "-m", "openmmpse", "accuracy", *files, "--output", str(tmp_path),
+                 "--rounds", "1000000", "--tolerances", "1e-1"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     seen = b""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the figures share: scenes, style, numbers in CSV files, and what of the library is available."""
+
 import csv
 import functools
 import sys
@@ -21,16 +22,31 @@ from openmmpse.accuracy import stages  # noqa: E402
 BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9", "#222222"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SPLIT_STYLE = {"Hasimoto": (BLUE, "o"), "Prolate": (ORANGE, "s")}
-STYLE = {"font.size": 10.5, "axes.titlesize": 11, "axes.titleweight": "bold", "axes.titlelocation": "left",
-         "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": True, "legend.framealpha": 0.9,
-         "legend.edgecolor": "none", "legend.fontsize": 9, "axes.grid": True, "grid.color": "#E2E2E2",
-         "grid.linewidth": 0.7, "axes.axisbelow": True, "lines.linewidth": 1.7, "lines.markersize": 6}
+STYLE = {
+    "font.size": 10.5,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": True,
+    "legend.framealpha": 0.9,
+    "legend.edgecolor": "none",
+    "legend.fontsize": 9,
+    "axes.grid": True,
+    "grid.color": "#E2E2E2",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.7,
+    "lines.markersize": 6,
+}
 LARGEST_PICTURE = 150_000  # bytes
 REAL_WORDS = ("neighbour", "real", "pair", "Lanczos")
 
 
 class Effort(NamedTuple):
     """How much to measure."""
+
     quick: bool
     threads: int
 
@@ -93,7 +109,7 @@ def values(rows, key):
 
 def millions(rows, key):
     """One entry of all rows, in millions."""
-    return [row[key]/1e6 for row in rows]
+    return [row[key] / 1e6 for row in rows]
 
 
 def distinct(rows, key):
@@ -124,13 +140,16 @@ def plainTicks(axis, subs=(1, 2, 5)):
 
 def markdown(header, lines):
     """Lines of a table."""
-    return ["| " + " | ".join(header) + " |", "|" + "---|"*len(header),
-            *("| " + " | ".join(line) + " |" for line in lines)]
+    return [
+        "| " + " | ".join(header) + " |",
+        "|" + "---|" * len(header),
+        *("| " + " | ".join(line) + " |" for line in lines),
+    ]
 
 
 def count(number):
     """1,234 or 1.23 million."""
-    return f"{number/1e6:.2f} million" if number >= 1e6 else f"{number:,.0f}"
+    return f"{number / 1e6:.2f} million" if number >= 1e6 else f"{number:,.0f}"
 
 
 def rounded(number):

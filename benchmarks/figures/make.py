@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Measure and draw the figures of docs/accuracy-and-speed.md.
 
-    python benchmarks/figures/make.py [NAME ...] --full    writes docs/figures/*.csv and *.png and the tables of the text
-    python benchmarks/figures/make.py [NAME ...] --quick   small scenes, into another folder; the text stays as it is
-    python benchmarks/figures/make.py [NAME ...] --redraw  pictures and tables again, from the CSV files that are there
+python benchmarks/figures/make.py [NAME ...] --full    writes docs/figures/*.csv and *.png and the tables of the text
+python benchmarks/figures/make.py [NAME ...] --quick   small scenes, into another folder; the text stays as it is
+python benchmarks/figures/make.py [NAME ...] --redraw  pictures and tables again, from the CSV files that are there
 """
+
 import argparse
 import os
 import platform
@@ -24,13 +25,13 @@ from tqdm import tqdm
 
 FIGURES = {module.NAME: module for module in (error, grid, effects, scaling, splitting, baseline, conditioning)}
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = ROOT/"docs"/"accuracy-and-speed.md"
+TEXT = ROOT / "docs" / "accuracy-and-speed.md"
 
 
 def main(argv=None):
     """Run with command-line arguments; returns the exit status."""
     options = _parse(argv)
-    folder = options.output or (ROOT/"build"/"figures" if options.quick else ROOT/"docs"/"figures")
+    folder = options.output or (ROOT / "build" / "figures" if options.quick else ROOT / "docs" / "figures")
     folder.mkdir(parents=True, exist_ok=True)
     bar = tqdm(options.names, bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}")
     try:
@@ -40,7 +41,7 @@ def main(argv=None):
                 measure(FIGURES[name], folder, common.Effort(options.quick, options.threads))
             picture(FIGURES[name], folder)
             if not options.quick and options.output is None:
-                fill(TEXT, name, common.readRows(folder/f"{name}.csv"))
+                fill(TEXT, name, common.readRows(folder / f"{name}.csv"))
     except KeyboardInterrupt:
         print("interrupted; figures that were finished are written", file=sys.stderr)
         return 130
@@ -68,15 +69,17 @@ def measure(module, folder, effort):
     """Write the CSV file of one figure, and beside it how it was made."""
     start = time.perf_counter()
     rows = module.measure(effort)
-    common.writeRows(folder/f"{module.NAME}.csv", rows)
+    common.writeRows(folder / f"{module.NAME}.csv", rows)
     seconds = time.perf_counter() - start
-    (folder/f"{module.NAME}.txt").write_text(
-        f"{platform.machine()}, {os.cpu_count()} processors, {effort.threads} threads, {seconds:.0f} s\n", encoding="utf-8")
+    (folder / f"{module.NAME}.txt").write_text(
+        f"{platform.machine()}, {os.cpu_count()} processors, {effort.threads} threads, {seconds:.0f} s\n",
+        encoding="utf-8",
+    )
 
 
 def picture(module, folder):
     """Draw one figure from its CSV file."""
-    module.draw(common.readRows(folder/f"{module.NAME}.csv"), folder/f"{module.NAME}.png")
+    module.draw(common.readRows(folder / f"{module.NAME}.csv"), folder / f"{module.NAME}.png")
 
 
 def fill(path, name, rows):

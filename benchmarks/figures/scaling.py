@@ -1,21 +1,45 @@
 # SPDX-License-Identifier: MIT
 """Particle-steps per second against N and phi, for suspensions and gels (seed paper, Figs 7 and 8, Table I)."""
+
 import numpy as np
-from common import BLACK, BLUE, GREEN, ORANGE, STYLE, count, markdown, panels, plainTicks, plt, realShare, rounded, save, scenes
+from common import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    STYLE,
+    count,
+    markdown,
+    panels,
+    plainTicks,
+    plt,
+    realShare,
+    rounded,
+    save,
+    scenes,
+)
 from common import millions, splits, values, where
 
 NAME = "scaling"
 TOLERANCE, PHI = 1e-3, 0.1
 # Seed paper, Table I: one NVIDIA Tesla K40, phi = 0.1, xi a = 0.5, relative tolerance 1e-3, in 1e6 particle-steps/s.
-PUBLISHED = {16: (5.2, 0.9), 32: (5.5, 1.0), 64: (6.1, 1.4), 128: (5.6, 1.6), 256: (5.9, 2.2), 512: (6.2, 2.8),
-             1024: (6.2, 3.3)}
+PUBLISHED = {
+    16: (5.2, 0.9),
+    32: (5.5, 1.0),
+    64: (6.1, 1.4),
+    128: (5.6, 1.6),
+    256: (5.9, 2.2),
+    512: (6.2, 2.8),
+    1024: (6.2, 3.3),
+}
 
 
 def measure(effort):
     rows = []
     thousands = effort.choose((1, 4, 16), (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024))
     for thousand in thousands:
-        rows.append(one("suspension", 1000*thousand, PHI, None, effort))
+        rows.append(one("suspension", 1000 * thousand, PHI, None, effort))
     number = 16000
     for phi in effort.choose((0.01, 0.1), (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4)):
         rows += [one("suspension", number, phi, split, effort) for split in splits()]
@@ -30,75 +54,136 @@ def one(kind, number, phi, split, effort):
     """A row: steps with and without noise in turns, no Forces."""
     positions, length = (scenes.gel if kind == "gel" else scenes.suspension)(number, phi)
     system = scenes.makeSystem(number, length)
-    pair = [scenes.hydrodynamic(system, positions, TOLERANCE, temperature, effort.threads, split)
-            for temperature in (scenes.TEMPERATURE, 0.0)]
-    steps = int(np.clip(30_000//number, 1, 20))
-    thermal, deterministic = scenes.secondsPerStep([x for _, x in pair], steps, rounds=2 if number > 100_000 else 4)
+    pair = [
+        scenes.hydrodynamic(system, positions, TOLERANCE, temperature, effort.threads, split)
+        for temperature in (scenes.TEMPERATURE, 0.0)
+    ]
+    steps = int(np.clip(30_000 // number, 1, 20))
+    rounds = 2 if number > 200_000 else 4 if number > 40_000 else 10
+    thermal, deterministic = scenes.secondsPerStep([x for _, x in pair], steps, rounds)
     _, first = pair[0]
     used = first.getNumericalParameters()
-    return {"kind": kind, "particles": number, "phi": phi, "split": used["split"], "asked": split or "automatic",
-            "thermal_ptps": number/thermal, "deterministic_ptps": number/deterministic,
-            "real_share": realShare(first), "xi_a": used["xi"]*scenes.RADIUS, "grid": used["gridDimensions"][0],
-            "cutoff_over_a": used["realCutoff"]/scenes.RADIUS, "iterations": used["lanczosIterations"]}
+    return {
+        "kind": kind,
+        "particles": number,
+        "phi": phi,
+        "split": used["split"],
+        "asked": split or "automatic",
+        "thermal_ptps": number / thermal,
+        "deterministic_ptps": number / deterministic,
+        "real_share": realShare(first),
+        "xi_a": used["xi"] * scenes.RADIUS,
+        "grid": used["gridDimensions"][0],
+        "cutoff_over_a": used["realCutoff"] / scenes.RADIUS,
+        "iterations": used["lanczosIterations"],
+    }
 
 
 def draw(rows, path):
     with plt.rc_context(STYLE):
         figure, (left, middle, right) = panels(3, width=12.5)
-        mine = where(rows, kind="suspension", phi=PHI, asked="automatic")
-        left.plot(values(mine, "particles"), millions(mine, "deterministic_ptps"), color=BLUE, marker="^", ls="--",
-                  label="suspension, without noise")
-        left.plot(values(mine, "particles"), millions(mine, "thermal_ptps"), color=BLUE, marker="o",
-                  label="suspension, with noise")
-        gels = where(rows, kind="gel", asked="automatic")
-        if gels:
-            left.plot(values(gels, "particles"), millions(gels, "thermal_ptps"), color=GREEN, marker="D",
-                      label=r"gel, $\phi$ = 0.02, with noise")
-        paper = [1000*n for n in PUBLISHED]
-        left.plot(paper, [d for d, _ in PUBLISHED.values()], color=BLACK, ls="--", marker="^", mfc="white", lw=1,
-                  label="published: K40 GPU, without noise")
-        left.plot(paper, [s for _, s in PUBLISHED.values()], color=BLACK, ls="-", marker="o", mfc="white", lw=1,
-                  label="published: K40 GPU, with noise")
-        left.set(xscale="log", xlabel="particles", title=rf"Against N ($\phi$ = {PHI:g}, tolerance 1e-3)")
-        sweep = [r for r in rows if r["asked"] != "automatic"]
-        shapes = (("suspension", "Hasimoto", BLUE, "o"), ("suspension", "Prolate", ORANGE, "s"), ("gel", "Hasimoto", GREEN, "D"),
-                  ("gel", "Prolate", "#AA4499", "v"))
-        for kind, split, colour, marker in shapes:
-            mine = where(sweep, kind=kind, asked=split)
-            if mine:
-                label = f"{kind}, {split} split"
-                middle.plot(values(mine, "phi"), millions(mine, "thermal_ptps"), color=colour, marker=marker, label=label)
-                right.plot(values(mine, "phi"), [100*x for x in values(mine, "real_share")], color=colour, marker=marker,
-                           label=label)
-        number = where(sweep, kind="gel")[0]["particles"]
-        middle.set(xscale="log", xlabel=r"volume fraction $\phi$", title=f"Against $\\phi$ ({number:,.0f} spheres, noise)")
-        right.set(xscale="log", xlabel=r"volume fraction $\phi$", ylabel="real half, % of the step", ylim=(0, 100),
-                  title="Share of the real half")
-        for axes in (left, middle):
+        _againstNumber(left, rows)
+        _againstDensity(middle, right, [row for row in rows if row["asked"] != "automatic"])
+        for axes, room in ((left, 0.6), (middle, 0.5)):
             axes.set(yscale="log", ylabel="million particle-steps per second")
             plainTicks(axes.yaxis)
             low, high = axes.get_ylim()
-            axes.set_ylim(low/1.2, high*(high/low)**(0.6 if axes is left else 0.5))
-        plainTicks(left.xaxis, subs=(1,))
-        for axes in (middle, right):
-            plainTicks(axes.xaxis)
+            axes.set_ylim(low / 1.2, high * (high / low) ** room)
         for axes in (left, middle, right):
             axes.legend(loc="upper left", fontsize=8.5)
         save(figure, path)
 
 
+def _againstNumber(axes, rows):
+    """Suspensions, gels and the published numbers against N."""
+    mine, gels = where(rows, kind="suspension", phi=PHI, asked="automatic"), where(rows, kind="gel", asked="automatic")
+    paper = [1000 * n for n in PUBLISHED]
+    without, noise = zip(*PUBLISHED.values())
+    number = values(mine, "particles")
+    curves = [
+        (number, millions(mine, "deterministic_ptps"), BLUE, "--", "^", "suspension, without noise"),
+        (number, millions(mine, "thermal_ptps"), BLUE, "-", "o", "suspension, with noise"),
+        (values(gels, "particles"), millions(gels, "thermal_ptps"), GREEN, "-", "D", r"gel, $\phi$ = 0.02, with noise"),
+    ]
+    for x, y, colour, ls, marker, label in curves:
+        if x:
+            axes.plot(x, y, color=colour, ls=ls, marker=marker, label=label)
+    for y, ls, marker, what in ((without, "--", "^", "without noise"), (noise, "-", "o", "with noise")):
+        axes.plot(paper, y, color=BLACK, ls=ls, marker=marker, mfc="white", lw=1, label=f"published: K40 GPU, {what}")
+    axes.set(xscale="log", xlabel="particles", title=rf"Against N ($\phi$ = {PHI:g}, tolerance 1e-3)")
+    plainTicks(axes.xaxis, subs=(1,))
+
+
+def _againstDensity(speed, share, rows):
+    """Speed and share of the real half against volume fraction, for both kinds of scenes and all splits."""
+    shapes = (
+        ("suspension", "Hasimoto", BLUE, "o"),
+        ("suspension", "Prolate", ORANGE, "s"),
+        ("gel", "Hasimoto", GREEN, "D"),
+        ("gel", "Prolate", PURPLE, "v"),
+    )
+    for kind, split, colour, marker in shapes:
+        mine = where(rows, kind=kind, asked=split)
+        if mine:
+            style = {"color": colour, "marker": marker, "label": f"{kind}, {split} split"}
+            speed.plot(values(mine, "phi"), millions(mine, "thermal_ptps"), **style)
+            share.plot(values(mine, "phi"), [100 * x for x in values(mine, "real_share")], **style)
+    speed.set(title=rf"Against $\phi$ ({rows[0]['particles']:,.0f} spheres, noise)")
+    share.set(ylabel="real half, % of the step", ylim=(0, 100), title="Share of the real half")
+    for axes in (speed, share):
+        axes.set(xscale="log", xlabel=r"volume fraction $\phi$")
+        plainTicks(axes.xaxis)
+
+
 def table(rows):
     lines = []
     for row in where(rows, kind="suspension", phi=PHI, asked="automatic"):
-        published = PUBLISHED.get(row["particles"]/1000)
-        lines.append([count(row["particles"]), rounded(row["deterministic_ptps"]), rounded(row["thermal_ptps"]),
-                      f"{row['thermal_ptps']/row['deterministic_ptps']:.2f}",
-                      *((f"{1e6*published[0]:,.0f}", f"{1e6*published[1]:,.0f}", f"{published[1]/published[0]:.2f}")
-                        if published else ("", "", ""))])
-    first = markdown(["particles", "without noise", "with noise", "ratio", "published (K40 GPU), without noise",
-                      "published (K40 GPU), with noise", "ratio"], lines)
-    lines = [[row["kind"], f"{row['phi']:g}", row["split"], rounded(row["thermal_ptps"]), f"{100*row['real_share']:.0f} %",
-              f"{row['xi_a']:.3g}", f"{row['cutoff_over_a']:.1f}", f"{row['grid']:.0f}³", f"{row['iterations']:.0f}"]
-             for row in rows if row["asked"] != "automatic"]
-    return [*first, "", *markdown(["scene", "phi", "split", "with noise", "real half", "xi a", "cut-off / a", "grid",
-                                   "Lanczos iterations"], lines)]
+        published = PUBLISHED.get(row["particles"] / 1000)
+        lines.append(
+            [
+                count(row["particles"]),
+                rounded(row["deterministic_ptps"]),
+                rounded(row["thermal_ptps"]),
+                f"{row['thermal_ptps'] / row['deterministic_ptps']:.2f}",
+                *(
+                    (f"{1e6 * published[0]:,.0f}", f"{1e6 * published[1]:,.0f}", f"{published[1] / published[0]:.2f}")
+                    if published
+                    else ("", "", "")
+                ),
+            ]
+        )
+    first = markdown(
+        [
+            "particles",
+            "without noise",
+            "with noise",
+            "with / without",
+            "published (K40 GPU), without noise",
+            "published (K40 GPU), with noise",
+            "with / without",
+        ],
+        lines,
+    )
+    lines = [
+        [
+            row["kind"],
+            f"{row['phi']:g}",
+            row["split"],
+            rounded(row["thermal_ptps"]),
+            f"{100 * row['real_share']:.0f} %",
+            f"{row['xi_a']:.3g}",
+            f"{row['cutoff_over_a']:.1f}",
+            f"{row['grid']:.0f}³",
+            f"{row['iterations']:.0f}",
+        ]
+        for row in rows
+        if row["asked"] != "automatic"
+    ]
+    return [
+        *first,
+        "",
+        *markdown(
+            ["scene", "phi", "split", "with noise", "real half", "xi a", "cut-off / a", "grid", "Lanczos iterations"],
+            lines,
+        ),
+    ]

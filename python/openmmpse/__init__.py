@@ -25,6 +25,6 @@ from openmmpse.plugins import loadMissing as _loadMissing
 PSEBrownianIntegrator.__module__ = __name__
 _loadMissing()
 
-from openmmpse import accuracy  # noqa: E402  (needs the integrator above)
+from openmmpse import accuracy as accuracy  # noqa: E402  (needs the integrator above)
 
-__all__ = ["PSEBrownianIntegrator", "accuracy"]
+__all__ = ["PSEBrownianIntegrator"]

@@ -36,9 +36,9 @@ def main(argv=None):
 def _parser():
     parser = argparse.ArgumentParser(
         prog="python -m openmmpse accuracy",
-        description="Measure error and time of a step over a range of tolerances, for your own scene, and recommend one.",
-        epilog="Write the files with openmm.XmlSerializer.serialize(...) of the System, of context.getState(positions=True) "
-        "and of the integrator. Settings given as options replace those of INTEGRATOR.xml.",
+        description="Measure error and time of a step over tolerances, for your own scene, and recommend one.",
+        epilog="Write the files with openmm.XmlSerializer.serialize(...) of the System, of "
+        "context.getState(positions=True) and of the integrator. Options replace the settings of INTEGRATOR.xml.",
     )
     parser.add_argument("system", type=Path, metavar="SYSTEM.xml")
     parser.add_argument("state", type=Path, metavar="STATE.xml", help="positions and box")
@@ -57,11 +57,13 @@ def _parser():
     parser.add_argument("--split", choices=("automatic", "Hasimoto", "Prolate", "both"), default="automatic")
     parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
                         help="for the tight run that errors are measured against (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--rounds", type=int, default=ROUNDS, help="timed turns of each tolerance (default: %(default)s)")
+    parser.add_argument(
+        "--rounds", type=int, default=ROUNDS, help="timed turns of each tolerance (default: %(default)s)"
+    )
     parser.add_argument("--output", type=Path, default=Path("accuracy-output"), metavar="DIR",
                         help="folder of the results (default: %(default)s)")  # fmt: skip
     parser.add_argument("--tune", action="store_true",
-                        help="instead, time other numerical parameters than the automatic ones at one tolerance")  # fmt: skip
+                        help="instead, time other parameters than the automatic ones at one tolerance")  # fmt: skip
     return parser
 
 

@@ -131,7 +131,8 @@ def _statisticalError(scene, runLength, correlationTime):
     name = "a^2/D0 = " if correlationTime is None else ""
     return statisticalError(components, independent), (
         f"statistical error: that of the diffusion coefficient from all displacements of a run of {runLength} steps, "
-        f"independent after {name}{time:.3g} ps, {components:.0f} of {3 * scene.count} components independent at one time"
+        f"independent after {name}{time:.3g} ps, {components:.0f} of {3 * scene.count} components "
+        "independent at one time"
     )
 
 

@@ -13,8 +13,8 @@ PARAMETERS = ("xi", "realCutoff", "gridDimensions", "windowSupport", "lanczosIte
 def text(result):
     """Lines of the whole report of a `Result`."""
     head = (
-        f"{result.count} particles on platform {result.platform}; errors of M f relative to max(|M f|, |f|/(6 pi eta a)) "
-        f"against a run at {_number(result.referenceTolerance)}"
+        f"{result.count} particles on platform {result.platform}; errors of M f relative to "
+        f"max(|M f|, |f|/(6 pi eta a)) against a run at {_number(result.referenceTolerance)}"
     )
     return [head, "", *table(result), "", *stageTable(result), "", *conclusions(result)]
 
@@ -35,7 +35,8 @@ def table(result):
             values = [f"{row.tolerance:.0e}", *(_number(row.errors.get(kind)) for kind in KINDS), _number(row.noise),
                       f"{used['xi']:.4g}", "x".join(map(str, used["gridDimensions"])), str(used["windowSupport"]),
                       str(used["lanczosIterations"]) if row.noise is not None else "-", _milliseconds(row.seconds),
-                      _milliseconds(row.bareSeconds), f"{result.count / row.seconds:.3g}" if row.seconds else "-"]  # fmt: skip
+                      _milliseconds(row.bareSeconds),
+                      f"{result.count / row.seconds:.3g}" if row.seconds else "-"]  # fmt: skip
             mark = "  <- recommended" if chosen and chosen.tolerance == row.tolerance else ""
             lines.append("  ".join(f"{value:>{width}}" for value, width in zip(values, widths)) + mark)
     return lines
@@ -81,7 +82,8 @@ def writeCsv(result, path):
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([
-            "split", "tolerance", *(f"error_{kind}" for kind in KINDS), *(f"error_{kind}_relative_to_Mf" for kind in KINDS),
+            "split", "tolerance", *(f"error_{kind}" for kind in KINDS),
+            *(f"error_{kind}_relative_to_Mf" for kind in KINDS),
             "lanczos_error", "noise_error", "best_s_per_step", "median_s_per_step", "best_s_per_step_without_forces",
             "median_s_per_step_without_forces", "particle_steps_per_s", *PARAMETERS, "recommended", "time_step_error",
             "statistical_error", "reference_tolerance", *(f"share: {name}" for name in stages),
@@ -92,7 +94,8 @@ def writeCsv(result, path):
                 row.split, f"{row.tolerance:.0e}", *(_full(row.errors.get(kind)) for kind in KINDS),
                 *(_full(row.plainErrors.get(kind)) for kind in KINDS), _full(row.lanczosError), _full(row.noise),
                 _full(row.seconds), _full(median(row.times)), _full(row.bareSeconds), _full(median(row.bareTimes)),
-                _full(result.count / row.seconds if row.seconds else None), *(_cell(row.parameters[k]) for k in PARAMETERS),
+                _full(result.count / row.seconds if row.seconds else None),
+                *(_cell(row.parameters[k]) for k in PARAMETERS),
                 int(bool(chosen and chosen.tolerance == row.tolerance)), _full(limits and limits.timeStep),
                 _full(limits and limits.statistical), f"{result.referenceTolerance:.0e}",
                 *(row.stages.get(name, "") for name in stages),

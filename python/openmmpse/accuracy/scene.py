@@ -61,8 +61,14 @@ class Scene:
         if platform in (None, name) and properties is None:
             names = context.getPlatform().getPropertyNames()
             properties = {key: context.getPlatform().getPropertyValue(context, key) for key in names}
-        return cls(context.getSystem(), state.getPositions(asNumpy=True), context.getIntegrator(),
-                   state.getPeriodicBoxVectors(), platform or name, properties)
+        return cls(
+            context.getSystem(),
+            state.getPositions(asNumpy=True),
+            context.getIntegrator(),
+            state.getPeriodicBoxVectors(),
+            platform or name,
+            properties,
+        )
 
     @property
     def count(self):
@@ -213,10 +219,10 @@ def _box(vectors):
 
 
 def _prepared(system, box, mobile):
-    """(copy of the System, group): in that box, which numerical parameters are chosen for, and with a Force to time with.
+    """(copy of the System, group): in that box, which parameters are chosen for, and with a Force to time with.
 
-    That Force pulls on one particle and is alone in its group, so that a step with this group alone costs what the fluid
-    costs: a step without any force would skip part of that. The group is None if the System uses all of them.
+    That Force pulls on one particle and is alone in its group, so that a step with this group alone costs what the
+    fluid costs: a step without any force would skip part of that. The group is None if the System uses all of them.
     """
     used = {force.getForceGroup() for force in system.getForces()}
     system = copy.deepcopy(system)

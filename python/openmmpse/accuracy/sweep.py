@@ -126,7 +126,9 @@ class Sweep:
         while expectedSeconds(seconds, tolerance) * len(self._kinds) > self.budget and tolerance < 1e-3:
             tolerance *= 10
         if tolerance > TIGHTEST:
-            self._note(f"reference at {tolerance:.0e}: a tighter one would take more than {self.budget:g} s by estimate")
+            self._note(
+                f"reference at {tolerance:.0e}: by estimate a tighter one takes over {self.budget:g} s"
+            )
         tight = None
         while tight is None:
             try:
@@ -223,7 +225,7 @@ def lanczosError(scene, probe):
 
 
 def expectedSeconds(seconds, tolerance):
-    """Rough time of a product M f at a tolerance, from that at 1e-3: the cube of the digits, twice in double precision."""
+    """Rough time of a product M f at a tolerance, from that at 1e-3: the cube of the digits, twice in double."""
     return seconds * DOUBLE_PRICE * (np.log10(tolerance) / -3) ** 3
 
 
