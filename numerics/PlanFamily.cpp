@@ -18,7 +18,8 @@ constexpr double BUDGET_PER_HALF = 0.5; ///< share of the tolerance that each ha
 constexpr double LOCAL_VOLUME_FRACTION = 0.3;
 /// in radii: here sums have few terms, which integrals estimate only roughly
 constexpr double SMALL_BOX = 12;
-constexpr double SMALL_BOX_SHARE = 0.5; ///< of the budget, therefore
+constexpr double SMALL_BOX_SHARE = 0.5;              ///< of the budget, therefore
+constexpr double TINY_BOX = 6, TINY_BOX_SHARE = 0.2; ///< and with a handful of terms
 /// Radii. What the window does to waves longer than this is a fixed small share of the velocity
 /// that they carry, which the tolerance is relative to: farther pairs do not count. Not so in long
 /// boxes, where few waves carry most of it.
@@ -53,6 +54,12 @@ Lattice scaledBox(const PlanRequest& r) {
     return Lattice(v.col(0), v.col(1), v.col(2));
 }
 
+/** The share of the budget that the estimates may use up in a box (radii). */
+double boxShare(const Lattice& box) {
+    const double width = box.smallestWidth();
+    return width < TINY_BOX ? TINY_BOX_SHARE : (width < SMALL_BOX ? SMALL_BOX_SHARE : 1);
+}
+
 /** Edge of the cube that the particles fill at volume fraction phi, in radii. */
 double extentOf(const PlanRequest& r, double phi) {
     const double lengths[3] = {r.box.length(0), r.box.length(1), r.box.length(2)};
@@ -82,8 +89,7 @@ double volumeFraction(const PlanRequest& r) {
 }
 
 PlanFamily::PlanFamily(const PlanRequest& request, double share)
-    : request(request), box(scaledBox(request)),
-      error(share * request.tolerance * (box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1)),
+    : request(request), box(scaledBox(request)), error(share * request.tolerance * boxShare(box)),
       meanPhi(volumeFraction(request)), phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)),
       extent(extentOf(request, phi)) {}
 
@@ -128,8 +134,7 @@ void PlanFamily::completeRealHalf(Plan& plan) const {
     plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE * request.box.smallestWidth();
     plan.lanczosTolerance =
         (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5 * request.tolerance);
-    plan.tableError =
-        TABLE_SHARE * request.tolerance * (box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1);
+    plan.tableError = TABLE_SHARE * request.tolerance * boxShare(box);
     const bool single = request.tolerance >= request.singleFloor &&
                         plan.realCutoff / plan.a <= plan.split->tableRange(true);
     plan.precision = (single ? Precision::Single : Precision::Double);
@@ -162,7 +167,8 @@ bool PlanFamily::fitGrid(Plan& plan, double unit, double& wave) const {
             return std::numeric_limits<double>::infinity();
         return waveErrorOf(plan);
     };
-    double low = COARSEST, high = FINEST;
+    // In small boxes, with few modes, the estimate alone is not to be trusted with coarser grids.
+    double low = (box.smallestWidth() < SMALL_BOX ? 1 : COARSEST), high = FINEST;
     wave = evaluate(high);
     if (!(wave <= error))
         return false;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "CpuEngine.h"
+#include "ParticleOrder.h"
 #include "numerics/Lanczos.h"
 #include <algorithm>
 #include <cmath>
@@ -17,6 +18,13 @@ bool isSmall(const Plan& plan, size_t particles) {
     return 10.0 * particles + plan.gridPoints() < SERIAL_WORK;
 }
 
+double largestComponent(const std::vector<Vec3>& forces) {
+    double largest = 0;
+    for (const Vec3& f : forces)
+        largest = std::max(largest, f.cwiseAbs().maxCoeff());
+    return largest;
+}
+
 } // namespace
 
 template <class Real>
@@ -32,102 +40,86 @@ CpuEngine<Real>::CpuEngine(const Plan& plan, const Lattice& box, double viscosit
 
 template <class Real> void CpuEngine<Real>::setPositions(const std::vector<Vec3>& x) {
     clock.start();
-    const int n = static_cast<int>(x.size());
-    fractions.resize(n);
-    threads.runBlocks(n, [&](int from, int to, int) {
+    fractions.resize(x.size());
+    const auto locate = [&](int from, int to) {
         for (int i = from; i < to; i++)
             fractions[i] = box.wrappedFractional(x[i]);
-    });
-    realSpace.setPositions(fractions);
+    };
+    placeParticles(threads, fractions, locate, realSpace, waveSpace);
+    clock.charge("sorting of particles and window weights");
+    realSpace.findNeighbours(fractions);
     clock.charge("neighbours and pair coefficients");
-    waveSpace.setPositions(fractions);
-    clock.charge("window weights");
 }
 
 template <class Real>
 void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const Thermal* thermal,
                                         std::vector<Vec3>& u) {
-    const int n = static_cast<int>(indices.size());
-    u.resize(n);
+    const double largest = (forces == NULL ? 0 : largestComponent(*forces));
     const double thermalForce =
         (thermal == NULL ? 0 : std::sqrt(2 * thermal->kT * drag / thermal->dt));
-    const double largest = (forces == NULL ? 0 : largestComponent(*forces));
-    const double scale = std::max(largest, thermalForce); // force unit
-    const bool forced = largest > 0;
-    const Real noise = (scale > 0 ? Real(thermalForce / scale) : 0);
-    velocities.assign(3 * size_t(n), Real(0));
+    const double unit = std::max(largest, thermalForce); // of forces
+    if (unit == 0) {
+        u.assign(indices.size(), Vec3::Zero());
+        return;
+    }
+    u.resize(indices.size());
     clock.start();
-    if (forced) {
-        scaledForces.resize(3 * size_t(n));
-        threads.runBlocks(n, [&](int from, int to, int) {
-            for (int i = from; i < to; i++)
-                for (int c = 0; c < 3; c++)
-                    scaledForces[3 * size_t(i) + c] = Real((*forces)[i][c] / scale);
-        });
-        addRealForced();
-        clock.charge("real-space velocities");
-    }
-    if (noise > 0) {
-        addRealThermal(*thermal, noise);
-        clock.charge("real-space noise (Lanczos)");
-    }
-    if (scale > 0)
-        waveSpace.addVelocities(forced ? scaledForces.data() : NULL, noise,
-                                noise > 0 ? thermal->wave : NoiseKey{}, velocities.data(), clock);
-    threads.runBlocks(n, [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            for (int c = 0; c < 3; c++)
-                u[i][c] = double(velocities[3 * size_t(i) + c]) * (scale / drag);
-    });
+    const bool forced = largest > 0;
+    const Real noise = Real(thermalForce / unit);
+    if (forced)
+        multiplyReal(*forces, unit);
+    clock.charge("real-space velocities");
+    if (noise > 0)
+        drawReal(*thermal);
+    writeReal(forced, noise, unit / drag, u);
+    clock.charge("real-space noise (Lanczos)");
+    waveSpace.addVelocities(forced, noise, noise > 0 ? thermal->wave : NoiseKey{}, unit / drag, u,
+                            clock);
 }
 
+/** Both halves take their forces, in units of `unit`; realForced = M_R f. */
 template <class Real>
-double CpuEngine<Real>::largestComponent(const std::vector<Vec3>& forces) const {
-    const int n = static_cast<int>(forces.size());
-    std::vector<double> ofBlock(Threads::blocks(n), 0.0);
-    threads.runBlocks(n, [&](int from, int to, int block) {
-        for (int i = from; i < to; i++)
-            ofBlock[block] = std::max(ofBlock[block], forces[i].cwiseAbs().maxCoeff());
-    });
-    return ofBlock.empty() ? 0 : *std::max_element(ofBlock.begin(), ofBlock.end());
-}
-
-/** velocities += s times a vector in the places of the real-space half. */
-template <class Real> void CpuEngine<Real>::addFromPlaces(Real s, const Vector& v) {
-    const std::vector<int>& order = realSpace.order();
-    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
-        for (int place = from; place < to; place++)
-            for (int c = 0; c < 3; c++)
-                velocities[3 * size_t(order[place]) + c] += s * v[3 * size_t(place) + c];
-    });
-}
-
-template <class Real> void CpuEngine<Real>::addRealForced() {
+void CpuEngine<Real>::multiplyReal(const std::vector<Vec3>& forces, double unit) {
     const std::vector<int>& order = realSpace.order();
     Vector& inPlaces = realSpace.basis(0); // free for this use until Lanczos begins
-    part.resize(scaledForces.size());
+    realForced.resize(inPlaces.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
             for (int c = 0; c < 3; c++)
-                inPlaces[3 * size_t(place) + c] = scaledForces[3 * size_t(order[place]) + c];
+                inPlaces[3 * size_t(place) + c] = Real(forces[order[place]][c] / unit);
+        waveSpace.takeForces(forces, unit, from, to);
     });
-    realSpace.multiplyAdd(inPlaces, 1, inPlaces, 0, part);
-    addFromPlaces(1, part);
+    realSpace.multiplyAdd(inPlaces, 1, inPlaces, 0, realForced);
 }
 
-template <class Real> void CpuEngine<Real>::addRealThermal(const Thermal& thermal, Real noise) {
+/** realThermal = M_R^{1/2} z. */
+template <class Real> void CpuEngine<Real>::drawReal(const Thermal& thermal) {
     const std::vector<int>& order = realSpace.order();
     Vector& z = realSpace.basis(0);
-    part.resize(z.size());
+    realThermal.resize(z.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         uint32_t particles[Threads::BLOCK]; // indices in the System
         for (int place = from; place < to; place++)
             particles[place - from] = static_cast<uint32_t>(indices[order[place]]);
         noiseLoops.particleNoise(thermal.real, particles, to - from, z.data() + 3 * size_t(from));
     });
-    iterations =
-        lanczosSquareRoot(realSpace, part, lanczosTolerance, negativeTolerance, reorthogonalise);
-    addFromPlaces(noise, part);
+    iterations = lanczosSquareRoot(realSpace, realThermal, lanczosTolerance, negativeTolerance,
+                                   reorthogonalise);
+}
+
+/** u = unit (realForced + noise realThermal), from places to particles. */
+template <class Real>
+void CpuEngine<Real>::writeReal(bool forced, Real noise, double unit, std::vector<Vec3>& u) const {
+    const std::vector<int>& order = realSpace.order();
+    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
+        for (int place = from; place < to; place++)
+            for (int c = 0; c < 3; c++) {
+                const size_t i = 3 * size_t(place) + c;
+                const Real forcedPart = (forced ? realForced[i] : 0),
+                           thermalPart = (noise > 0 ? noise * realThermal[i] : 0);
+                u[order[place]][c] = unit * double(forcedPart + thermalPart);
+            }
+    });
 }
 
 template class CpuEngine<float>;

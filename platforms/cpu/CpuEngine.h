@@ -24,10 +24,9 @@ public:
 
 private:
     using Vector = std::vector<Real>;
-    double largestComponent(const std::vector<numerics::Vec3>& forces) const;
-    void addFromPlaces(Real s, const Vector& v);
-    void addRealForced();
-    void addRealThermal(const Thermal& thermal, Real noise);
+    void multiplyReal(const std::vector<numerics::Vec3>& forces, double unit);
+    void drawReal(const Thermal& thermal);
+    void writeReal(bool forced, Real noise, double unit, std::vector<numerics::Vec3>& u) const;
 
     double drag; ///< 6 pi eta a
     double lanczosTolerance, negativeTolerance;
@@ -40,8 +39,7 @@ private:
     CpuWaveSpace<Real> waveSpace;
     WaveKernels<Real> noiseLoops = waveKernels<Real>();
     std::vector<numerics::Vec3> fractions;
-    Vector scaledForces, velocities; ///< [n][3] by particle
-    Vector part;                     ///< [n][3] by place of the real-space half
+    Vector realForced, realThermal; ///< [n][3] by place of the real-space half
     int iterations = 0;
 };
 

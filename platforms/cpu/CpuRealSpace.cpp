@@ -68,18 +68,27 @@ CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Thr
 }
 
 template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
-    const int n = static_cast<int>(fractions.size());
-    rowStart.resize(n);
-    rowCount.resize(n);
-    blocks.resize(Threads::blocks(n));
-    if (sumImages) {
+    placeParticles(
+        threads, fractions, [](int, int) {}, *this);
+    findNeighbours(fractions);
+}
+
+template <class Real> void CpuRealSpace<Real>::begin(int particles) {
+    rowStart.resize(particles);
+    rowCount.resize(particles);
+    blocks.resize(Threads::blocks(particles));
+    cellOf.resize(particles);
+    for (auto& axis : axes)
+        axis.resize(particles + PAIR_LANES);
+    prepareCells(particles);
+}
+
+template <class Real> void CpuRealSpace<Real>::findNeighbours(const std::vector<Vec3>& fractions) {
+    if (sumImages)
         fillRowsWithImages(fractions);
-        return;
-    }
-    prepareCells(n);
-    sortByCell(fractions);
-    threads.run(Threads::blocks(n),
-                [&](int task, int thread) { fillRowsOf(task, thread, fractions); });
+    else
+        threads.run(static_cast<int>(blocks.size()),
+                    [&](int task, int thread) { fillRowsOf(task, thread, fractions); });
 }
 
 /** Columns of cells about as wide as the range; not many more cells than particles. */
@@ -95,27 +104,26 @@ template <class Real> void CpuRealSpace<Real>::prepareCells(int particles) {
     cellCount[2] = std::min(cellCount[2], std::max(1, most / (cellCount[0] * cellCount[1])));
 }
 
-template <class Real> void CpuRealSpace<Real>::sortByCell(const std::vector<Vec3>& fractions) {
-    const int n = static_cast<int>(fractions.size());
-    cellOf.resize(n);
-    threads.runBlocks(n, [&](int from, int to, int) {
-        for (int i = from; i < to; i++) {
-            int cell = 0;
-            for (int d = 0; d < 3; d++)
-                cell = cell * cellCount[d] +
-                       std::min(static_cast<int>(fractions[i][d] * cellCount[d]), cellCount[d] - 1);
-            cellOf[i] = cell;
-        }
-    });
+template <class Real>
+void CpuRealSpace<Real>::assign(const std::vector<Vec3>& fractions, int from, int to) {
+    for (int i = from; i < to; i++) {
+        int cell = 0;
+        for (int d = 0; d < 3; d++)
+            cell = cell * cellCount[d] +
+                   std::min(static_cast<int>(fractions[i][d] * cellCount[d]), cellCount[d] - 1);
+        cellOf[i] = cell;
+    }
+}
+
+template <class Real> void CpuRealSpace<Real>::sort() {
     sortByKey(cellOf, cellCount[0] * cellCount[1] * cellCount[2], cellStart, particleAt);
-    for (auto& axis : axes)
-        axis.resize(n + PAIR_LANES);
-    threads.runBlocks(n, [&](int from, int to, int) {
-        for (int place = from; place < to; place++)
-            for (int d = 0; d < 3; d++)
-                axes[d][place] =
-                    PairCoordinate<Real>::fromFraction(fractions[particleAt[place]][d]);
-    });
+}
+
+template <class Real>
+void CpuRealSpace<Real>::place(const std::vector<Vec3>& fractions, int from, int to) {
+    for (int place = from; place < to; place++)
+        for (int d = 0; d < 3; d++)
+            axes[d][place] = PairCoordinate<Real>::fromFraction(fractions[particleAt[place]][d]);
 }
 
 /** The runs of places, at most two for each column of cells, that hold all neighbours of s. */
@@ -181,9 +189,6 @@ void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) 
     const PairPolynomials<Real> table = polynomials();
     const std::vector<Vec3> images = box.imagesWithin(range);
     const int n = static_cast<int>(fractions.size());
-    particleAt.resize(n);
-    for (int i = 0; i < n; i++)
-        particleAt[i] = i;
     threads.run(Threads::blocks(n), [&](int task, int) {
         std::vector<PairBlock<Real>>& mine = blocks[task];
         mine.clear();
@@ -192,7 +197,8 @@ void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) 
             int used = PAIR_LANES;
             for (int j = 0; j < n; j++)
                 for (const Vec3& image : images) {
-                    const Vec3 d = box.vectors() * (fractions[i] - fractions[j]) + image;
+                    const Vec3 d =
+                        box.cartesian(fractions[particleAt[i]] - fractions[particleAt[j]]) + image;
                     if (d.squaredNorm() >= range * range || (i == j && image == Vec3::Zero()))
                         continue;
                     if (used == PAIR_LANES) {

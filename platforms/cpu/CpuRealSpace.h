@@ -30,6 +30,12 @@ public:
     static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES;
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
+    // The same in parts: those of placeParticles(), then
+    void begin(int particles);
+    void assign(const std::vector<numerics::Vec3>& fractions, int from, int to);
+    void sort();
+    void place(const std::vector<numerics::Vec3>& fractions, int from, int to);
+    void findNeighbours(const std::vector<numerics::Vec3>& fractions);
     /** The particle at each place. */
     const std::vector<int>& order() const { return particleAt; }
 
@@ -45,8 +51,6 @@ public:
 
 private:
     void prepareCells(int particles);
-    void sortByCell(const std::vector<numerics::Vec3>& fractions);
-    void fillRows(const std::vector<numerics::Vec3>& fractions);
     void fillRowsOf(int task, int thread, const std::vector<numerics::Vec3>& fractions);
     int findRuns(const numerics::Vec3& s, PairRun* runs) const;
     void fillRowsWithImages(const std::vector<numerics::Vec3>& fractions);

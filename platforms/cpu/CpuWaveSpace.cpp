@@ -105,36 +105,58 @@ template <class Real> void CpuWaveSpace<Real>::prepareFactors(const Plan& plan) 
 }
 
 template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
-    const int n = static_cast<int>(fractions.size());
-    columnOf.resize(n);
-    first.resize(3 * n);
-    weights.resize(3 * size_t(n) * padded);
-    // The window of a particle at u, in grid units, begins at ceil(u - P/2). Truncation is in line
-    // on every machine, std::ceil a call.
-    const auto begin = [&](double u) {
-        const double shifted = u + 0.5 * support; // positive
-        const int below = static_cast<int>(shifted);
-        return below + (below < shifted) - support;
-    };
-    const auto wrapped = [&](int d, int i) { return i < 0 ? i + size[d] : i; };
-    threads.runBlocks(n, [&](int from, int to, int) {
-        for (int i = from; i < to; i++)
-            columnOf[i] = wrapped(0, begin(fractions[i][0] * size[0])) * size[1] +
-                          wrapped(1, begin(fractions[i][1] * size[1]));
-    });
+    placeParticles(
+        threads, fractions, [](int, int) {}, *this);
+}
+
+template <class Real> void CpuWaveSpace<Real>::begin(int particles) {
+    columnOf.resize(particles);
+    first.resize(3 * size_t(particles));
+    sorted.resize(3 * size_t(particles));
+    weights.resize(3 * size_t(particles) * padded);
+}
+
+/**
+ * Where the window of a particle at u begins, in grid units: ceil(u - P/2). Truncation is in line
+ * on every machine, std::ceil a call.
+ */
+template <class Real> int CpuWaveSpace<Real>::windowStart(double u) const {
+    const double shifted = u + 0.5 * support; // positive
+    const int below = static_cast<int>(shifted);
+    return below + (below < shifted) - support;
+}
+
+template <class Real>
+void CpuWaveSpace<Real>::assign(const std::vector<Vec3>& fractions, int from, int to) {
+    for (int i = from; i < to; i++)
+        columnOf[i] = wrapped(0, windowStart(fractions[i][0] * size[0])) * size[1] +
+                      wrapped(1, windowStart(fractions[i][1] * size[1]));
+}
+
+template <class Real> void CpuWaveSpace<Real>::sort() {
     sortByKey(columnOf, size[0] * size[1], columnStart, order);
-    const WindowPolynomials<Real> window = {windowDegree, padded, windowCoefficients.data()};
-    threads.runBlocks(n, [&](int from, int to, int) {
-        Real offsets[3 * Threads::BLOCK];
-        for (int slot = from; slot < to; slot++)
-            for (int d = 0; d < 3; d++) {
-                const double u = fractions[order[slot]][d] * size[d];
-                first[3 * slot + d] = wrapped(d, begin(u));
-                offsets[3 * (slot - from) + d] = Real(2 * (begin(u) - u) + support - 1);
-            }
-        gridLoops.evaluateWindows(window, offsets, to - from,
-                                  weights.data() + 3 * size_t(from) * padded);
-    });
+}
+
+template <class Real>
+void CpuWaveSpace<Real>::place(const std::vector<Vec3>& fractions, int from, int to) {
+    Real offsets[3 * Threads::BLOCK];
+    for (int slot = from; slot < to; slot++)
+        for (int d = 0; d < 3; d++) {
+            const double u = fractions[order[slot]][d] * size[d];
+            const int start = windowStart(u);
+            first[3 * size_t(slot) + d] = wrapped(d, start);
+            offsets[3 * (slot - from) + d] = Real(2 * (start - u) + support - 1);
+        }
+    gridLoops.evaluateWindows({windowDegree, padded, windowCoefficients.data()}, offsets, to - from,
+                              weights.data() + 3 * size_t(from) * padded);
+}
+
+template <class Real>
+void CpuWaveSpace<Real>::takeForces(const std::vector<Vec3>& forces, double unit, int from,
+                                    int to) {
+    for (int slot = from; slot < to; slot++)
+        for (int c = 0; c < 3; c++)
+            sorted[3 * size_t(slot) + c] = Real(forces[order[slot]][c] / unit);
 }
 
 template <class Real> GridParticles<Real> CpuWaveSpace<Real>::particles() const {
@@ -143,14 +165,7 @@ template <class Real> GridParticles<Real> CpuWaveSpace<Real>::particles() const 
             first.data(), weights.data(), sorted.data()};
 }
 
-template <class Real> void CpuWaveSpace<Real>::spread(const Real* forces) {
-    const int n = static_cast<int>(order.size());
-    sorted.resize(3 * order.size());
-    threads.runBlocks(n, [&](int from, int to, int) {
-        for (int slot = from; slot < to; slot++)
-            for (int c = 0; c < 3; c++)
-                sorted[3 * size_t(slot) + c] = forces[3 * size_t(order[slot]) + c];
-    });
+template <class Real> void CpuWaveSpace<Real>::spread() {
     const GridParticles<Real> placed = particles();
     // A plane belongs to one task, which adds the particles in their order: no two threads write
     // one number.
@@ -197,7 +212,7 @@ void CpuWaveSpace<Real>::scaleLine(int y, int thread, WaveColumns<Real> columns)
         }
 }
 
-template <class Real> void CpuWaveSpace<Real>::gather(Real* u) {
+template <class Real> void CpuWaveSpace<Real>::gather(double unit, std::vector<Vec3>& u) {
     threads.run(size[0], [&](int x, int thread) {
         for (FftArray<Real>& grid : grids) {
             Real* const plane = grid.begin() + x * planeLength;
@@ -209,27 +224,26 @@ template <class Real> void CpuWaveSpace<Real>::gather(Real* u) {
             }
         }
     });
-    sorted.resize(3 * order.size());
     const GridParticles<Real> placed = particles();
     const Real* data[3] = {grids[0].begin(), grids[1].begin(), grids[2].begin()};
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         gridLoops.gatherVelocities(placed, from, to, data, sorted.data());
         for (int slot = from; slot < to; slot++)
             for (int c = 0; c < 3; c++)
-                u[3 * size_t(order[slot]) + c] += sorted[3 * size_t(slot) + c];
+                u[order[slot]][c] += unit * double(sorted[3 * size_t(slot) + c]);
     });
 }
 
 template <class Real>
-void CpuWaveSpace<Real>::addVelocities(const Real* forces, Real noise, const NoiseKey& key, Real* u,
-                                       StageClock& clock) {
+void CpuWaveSpace<Real>::addVelocities(bool forced, Real noise, const NoiseKey& key, double unit,
+                                       std::vector<Vec3>& u, StageClock& clock) {
     clock.start();
-    if (forces != NULL)
-        spread(forces);
+    if (forced)
+        spread();
     clock.charge("spreading and planes of the transform");
-    scale(forces != NULL, noise, key);
+    scale(forced, noise, key);
     clock.charge("waves (noise, scaling, columns of the transform)");
-    gather(u);
+    gather(unit, u);
     clock.charge("planes of the inverse transform and gathering");
 }
 

@@ -26,13 +26,20 @@ public:
     static double bytesPerGridPoint(const numerics::Plan& plan);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
+    // The same in parts, those of placeParticles():
+    void begin(int particles);
+    void assign(const std::vector<numerics::Vec3>& fractions, int from, int to);
+    void sort();
+    void place(const std::vector<numerics::Vec3>& fractions, int from, int to);
+    /** The forces of addVelocities() on the particles at places [from, to), over a unit. */
+    void takeForces(const std::vector<numerics::Vec3>& forces, double unit, int from, int to);
     /**
-     * u += M_W f + noise M_W^{1/2} z.
-     * @param forces  [n][3], or NULL
+     * u += unit (M_W f + noise M_W^{1/2} z).
+     * @param forced  there are forces, and takeForces() was called for all places
      * @param noise   amplitude, 0 for none
      */
-    void addVelocities(const Real* forces, Real noise, const numerics::NoiseKey& key, Real* u,
-                       StageClock& clock);
+    void addVelocities(bool forced, Real noise, const numerics::NoiseKey& key, double unit,
+                       std::vector<numerics::Vec3>& u, StageClock& clock);
 
 private:
     using Complex = std::complex<Real>;
@@ -43,10 +50,12 @@ private:
     /** Signed wave index of a place along axis d. */
     int waveIndex(int d, int i) const { return 2 * i <= size[d] ? i : i - size[d]; }
     GridParticles<Real> particles() const;
-    void spread(const Real* forces);
+    int windowStart(double u) const;
+    int wrapped(int d, int i) const { return i < 0 ? i + size[d] : i; }
+    void spread();
     void scale(bool forced, Real noise, const numerics::NoiseKey& key);
     void scaleLine(int y, int thread, WaveColumns<Real> columns);
-    void gather(Real* u);
+    void gather(double unit, std::vector<numerics::Vec3>& u);
 
     numerics::Lattice box;
     double a;

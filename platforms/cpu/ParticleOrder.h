@@ -2,6 +2,8 @@
 #ifndef OPENMMPSE_PARTICLEORDER_H_
 #define OPENMMPSE_PARTICLEORDER_H_
 
+#include "Threads.h"
+#include "numerics/Vec3.h"
 #include <vector>
 
 namespace PSE {
@@ -24,6 +26,33 @@ inline void sortByKey(const std::vector<int>& keys, int numKeys, std::vector<int
     for (int key = numKeys; key > 0; key--) // each start has moved to its end
         start[key] = start[key - 1];
     start[0] = 0;
+}
+
+/**
+ * New positions for some halves of the mobility at once, so that threads meet as seldom as
+ * possible: each half has
+ *
+ *     begin(n)                 room for n particles
+ *     assign(s, from, to)      keys of particles [from, to) with fractional coordinates s
+ *     sort()                   serial: one half per thread
+ *     place(s, from, to)       what each place of [from, to) needs to know of its particle
+ *
+ * @param locate  locate(from, to) makes the coordinates of particles [from, to) valid
+ */
+template <class Locate, class... Halves>
+void placeParticles(const Threads& threads, const std::vector<numerics::Vec3>& s, Locate locate,
+                    Halves&... halves) {
+    const int n = static_cast<int>(s.size());
+    (halves.begin(n), ...);
+    threads.runBlocks(n, [&](int from, int to, int) {
+        locate(from, to);
+        (halves.assign(s, from, to), ...);
+    });
+    threads.run(sizeof...(halves), [&](int task, int) {
+        int half = 0;
+        ((half++ == task ? halves.sort() : void()), ...);
+    });
+    threads.runBlocks(n, [&](int from, int to, int) { (halves.place(s, from, to), ...); });
 }
 
 } // namespace PSE
