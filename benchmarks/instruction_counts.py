@@ -4,7 +4,7 @@
 Times vary with the machine and its other users; instructions do not: from run to run, ours and FFTW's are the same to
 the last one, the total to 3e-4 (waiting for a thread). They depend on the instruction set, which is fixed to AVX2, and
 on the compiler and the libraries, which are recorded beside the counts: where these differ, growth is reported without
-failing. Each case counts one neighbour list and five steps on one thread.
+failing. Each case counts five steps on one thread.
 """
 import argparse
 import json

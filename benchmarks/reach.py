@@ -2,7 +2,7 @@
 """Measure the targets of speed and memory of the CPU platform, each as a ratio inside one run, and judge them.
 
 Everything: tolerance 1e-3, kT > 0, volume fraction 0.1, two threads, unless the row says otherwise; dt D0/a^2 = 1e-3,
-so that neighbour lists age as they do in real runs. Contenders take turns in rounds; a row is the median of the ratios
+as real runs have: OpenMM's own neighbour list does not last long then. Contenders take turns in rounds; a row is the median of the ratios
 of the rounds, with the smallest and largest beside it. "Others" is the share of the machine's processors that other
 processes took meanwhile. Above 10 % a verdict carries a question mark: times on the wall say little, and "by CPU", the
 same from the processor time of all threads, says more (it knows nothing of threads that wait for each other).
@@ -22,53 +22,17 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import openmm
-from openmm import unit
+from scenes import DRAG, MASS, RADIUS, STEP, TEMPERATURE, VISCOSITY, context, lattice, makeSystem
 
 from openmmpse import PSEBrownianIntegrator
 
-RADIUS, VISCOSITY, TEMPERATURE, MASS = 1.0, 600.0, 300.0, 100.0  # nm, Da/(nm ps), K, Da
-KT = (unit.MOLAR_GAS_CONSTANT_R*TEMPERATURE*unit.kelvin).value_in_unit(unit.kilojoule_per_mole)
-DRAG = 6*math.pi*VISCOSITY*RADIUS
-STEP = 1e-3*RADIUS**2*DRAG/KT  # ps; dt D0/a^2 = 1e-3
 SMALL, LARGE = 16000, 1000000
 BUSY = 0.1  # share of the processors that others take from which on times on the wall are doubtful
 PROGRAM = Path(__file__).resolve().parents[1]/"build"/"venv"/"bench_stages"
 
 
 # ---------------------------------------------------------------- scenes
-
-def latticePositions(count, phi, shuffled):
-    """Positions (count, 3) on random places of a jittered cubic lattice, and the length of the box (nm)."""
-    rng = np.random.default_rng(1)
-    length = (count*4/3*np.pi*RADIUS**3/phi)**(1/3)
-    side = math.ceil(count**(1/3) - 1e-9)
-    places = np.sort(rng.choice(side**3, count, replace=False))
-    cells = np.stack(np.unravel_index(places, (side,)*3), axis=1)
-    jitter = rng.uniform(-0.5, 0.5, cells.shape)*max(0.2*RADIUS, length/side - 2*RADIUS)
-    positions = (cells + 0.5)*(length/side) + jitter
-    return (rng.permutation(positions) if shuffled else positions), length
-
-
-def makeSystem(count, length, repulsion):
-    """Spheres that repel each other (WCA), or a constant force on the first one."""
-    system = openmm.System()
-    system.setDefaultPeriodicBoxVectors(*(np.eye(3)*length))
-    for _ in range(count):
-        system.addParticle(MASS)
-    if repulsion:
-        force = openmm.CustomNonbondedForce(f"{KT}*(4*(s^12-s^6)+1); s={2*RADIUS/2**(1/6)}/r")
-        force.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
-        force.setCutoffDistance(2*RADIUS)
-        for _ in range(count):
-            force.addParticle([])
-    else:
-        force = openmm.CustomExternalForce("-x")
-        force.addParticle(0)
-    system.addForce(force)
-    return system
-
 
 def pse(tolerance):
     integrator = PSEBrownianIntegrator(TEMPERATURE, VISCOSITY, RADIUS, STEP)
@@ -78,27 +42,21 @@ def pse(tolerance):
     return integrator
 
 
-def newContext(system, integrator, threads):
-    return openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
-
-
 class Contender:
     """A Context whose steps are timed. `count` particles, `steps` per visit."""
 
     def __init__(self, count=SMALL, phi=0.1, tolerance=1e-3, threads=2, repulsion=False, fluid=True, shuffled=True,
                  steps=None):
-        positions, length = latticePositions(count, phi, shuffled)
+        positions, length = lattice(count, phi, shuffled)
         system = makeSystem(count, length, repulsion)
         if repulsion:  # contacts as the dynamics leaves them
             before = openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
-            settled = newContext(system, before, 2)
-            settled.setPositions(positions)
+            settled = context(system, positions, before, 2)
             before.step(50)
             positions = settled.getState(positions=True).getPositions(asNumpy=True)
             del settled
         integrator = pse(tolerance) if fluid else openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
-        self.context = newContext(system, integrator, threads)
-        self.context.setPositions(positions)
+        self.context = context(system, positions, integrator, threads)
         self.count = count
         self.steps = steps or 10
         self.integrator = integrator
@@ -243,21 +201,22 @@ def rowMemory(options):
 
 
 def rowCreation(options):
-    positions, length = latticePositions(SMALL, 0.1, True)
+    positions, length = lattice(SMALL, 0.1)
     system = makeSystem(SMALL, length, True)
     fluid, plain = Times(), Times()
     for _ in range(options.rounds):
         for times in (fluid, plain):
             integrator = pse(1e-3) if times is fluid else openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
             wall, cpu = time.perf_counter(), time.process_time()
-            context = newContext(system, integrator, 2)
+            made = context(system, positions, integrator, 2)
             times.add(time.perf_counter() - wall, time.process_time() - cpu)
-            del context, integrator
+            del made, integrator
     return [Result("creation", lambda seconds: seconds, (fluid,), f"{fluid}, of which OpenMM's own {plain}")]
 
 
 ROWS = {"step": rowStep, "fft": rowFft, "ptps": rowPtps, "large": rowLarge, "phi": rowPhi, "tolerance": rowTolerance,
         "threads": rowThreads, "memory": rowMemory, "creation": rowCreation}
+NEED_PROGRAM = {"fft", "memory"}
 # name: what, must, aim, whether less is better
 TARGETS = {
     "step": ("step of 16,000 WCA spheres / BrownianIntegrator's", 8, 4, True),
@@ -329,6 +288,14 @@ class Processors:
         return max(0.0, busy - own)/total if total > 0 else 0.0
 
 
+def measured(name, options):
+    """The judged rows of one of ROWS."""
+    processors = Processors()
+    results = ROWS[name](options)
+    others = processors.others()
+    return [judged(result, others) for result in results]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS), metavar="ROW",
@@ -338,16 +305,14 @@ def main():
     parser.add_argument("--output", type=Path, help="write the table here, too, as JSON")
     options = parser.parse_args()
     options.rounds = 3 if options.quick else 9
-    if not options.program.exists() and {"fft", "memory"} & set(options.rows):
+    if not options.program.exists() and NEED_PROGRAM & set(options.rows):
         parser.error(f"{options.program} is missing; build it with ./run bench, or choose other --rows")
     rows = []
     print(HEADER)
     for name in options.rows:
-        processors = Processors()
-        results = ROWS[name](options)
-        for result in results:
-            rows.append(judged(result, processors.others()))
-            print(line(rows[-1]), flush=True)
+        for row in measured(name, options):
+            rows.append(row)
+            print(line(row), flush=True)
     if options.output:
         options.output.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     missed = [row["row"] + ("?" if row["doubtful"] else "") for row in rows if row["verdict"] == "MISSED"]

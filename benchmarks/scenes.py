@@ -12,7 +12,7 @@ from openmmpse import PSEBrownianIntegrator
 RADIUS, VISCOSITY, TEMPERATURE, MASS = 1.0, 600.0, 300.0, 100.0  # nm, Da/(nm ps), K, Da
 DRAG = 6 * np.pi * VISCOSITY * RADIUS
 KT = 0.00831446261815324 * TEMPERATURE
-STEP = 1e-3 * RADIUS**2 * DRAG / KT  # ps; dt D0/a^2 = 1e-3, so that neighbour lists age as they do in real runs
+STEP = 1e-3 * RADIUS**2 * DRAG / KT  # ps; dt D0/a^2 = 1e-3, as real runs have
 TILE = 130_000  # particles; larger suspensions are periodic repetitions of smaller ones
 GEL_TILE = 2000
 
@@ -25,12 +25,16 @@ def edge(numParticles, phi):
     return (numParticles * 4 / 3 * np.pi * RADIUS**3 / phi) ** (1 / 3)
 
 
-def lattice(numParticles, phi):
-    """Positions (N, 3) on a jittered cubic lattice in random order, without overlaps up to phi = 0.5, and the edge."""
+def lattice(numParticles, phi, shuffled=True):
+    """Positions (N, 3) on a jittered cubic lattice without overlaps up to phi = 0.5, and the edge.
+
+    In random order, as in a suspension that has been stirred, or in the order of space.
+    """
     length = edge(numParticles, phi)
     side = int(np.ceil(numParticles ** (1 / 3) - 1e-9))
     rng = np.random.default_rng(0)
-    cells = np.stack(np.unravel_index(rng.choice(side**3, numParticles, replace=False), (side,) * 3), axis=1)
+    places = rng.choice(side**3, numParticles, replace=False)
+    cells = np.stack(np.unravel_index(places if shuffled else np.sort(places), (side,) * 3), axis=1)
     jitter = rng.uniform(-0.5, 0.5, cells.shape) * max(0.0, 1 - 2 * RADIUS * side / length)
     return (cells + 0.5 + jitter) * length / side, length
 

@@ -18,8 +18,9 @@ constexpr double BUDGET_PER_HALF = 0.5; ///< share of the tolerance that each ha
 constexpr double LOCAL_VOLUME_FRACTION = 0.3;
 /// in radii: here sums have few terms, which integrals estimate only roughly
 constexpr double SMALL_BOX = 12;
-constexpr double SMALL_BOX_SHARE = 0.5;              ///< of the budget, therefore
-constexpr double TINY_BOX = 6, TINY_BOX_SHARE = 0.2; ///< and with a handful of terms
+constexpr double SMALL_BOX_SHARE = 0.5; ///< of the budget, therefore
+/// and with a handful of terms, where only Hasimoto's split has room
+constexpr double TINY_BOX = 6, TINY_BOX_SHARE = 0.4;
 /// Radii. What the window does to waves longer than this is a fixed small share of the velocity
 /// that they carry, which the tolerance is relative to: farther pairs do not count. Not so in long
 /// boxes, where few waves carry most of it.
@@ -56,8 +57,7 @@ Lattice scaledBox(const PlanRequest& r) {
 
 /** The share of the budget that the estimates may use up in a box (radii). */
 double boxShare(const Lattice& box) {
-    const double width = box.smallestWidth();
-    return width < TINY_BOX ? TINY_BOX_SHARE : (width < SMALL_BOX ? SMALL_BOX_SHARE : 1);
+    return box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1;
 }
 
 /** Edge of the cube that the particles fill at volume fraction phi, in radii. */
@@ -223,7 +223,10 @@ std::string PlanFamily::windowRefusal(const Plan& plan, double wave) const {
     return message.str();
 }
 
-HasimotoPlans::HasimotoPlans(const PlanRequest& request) : PlanFamily(request, BUDGET_PER_HALF) {}
+HasimotoPlans::HasimotoPlans(const PlanRequest& request) : PlanFamily(request, BUDGET_PER_HALF) {
+    if (box.smallestWidth() < TINY_BOX)
+        error *= TINY_BOX_SHARE;
+}
 
 Plan HasimotoPlans::best() const {
     double cost = 0;

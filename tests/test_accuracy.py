@@ -317,7 +317,7 @@ def testTuningOffersWhatTheIntegratorAccepts(small, platformName):
         for key in ("xi", "gridDimensions", "windowSupport", "realCutoff"):
             assert used[key] == candidate.parameters[key]
         assert candidate.error <= 2e-2
-    assert len({candidate.parameters["xi"] for candidate in result.candidates}) >= 5
+    assert len({candidate.parameters["xi"] for candidate in result.candidates}) >= 3  # the box is small
 
 
 def testTuningKeepsTheTolerance():
@@ -351,7 +351,7 @@ def testCommandWritesTablePictureAndNumbers(files, tmp_path, capsys):
     arguments = [*files, "--output", str(out), *SMALL, "--tolerances", "1e-1", "1e-3", "1e-5", "--run-length", "5000"]
     assert accuracy.main(arguments) == 0
     printed = capsys.readouterr().out
-    assert "Hasimoto split" in printed or "Prolate split" in printed
+    assert "automatic split" in printed and ("Hasimoto" in printed or "Prolate" in printed)
     assert "Recommended tolerance" in printed and "run of 5000 steps" in printed
     assert (out/"accuracy.txt").read_text().strip() in printed
     assert (out/"accuracy.png").read_bytes().startswith(b"\x89PNG")
@@ -401,7 +401,8 @@ def testInterruptionLeavesWhatIsKnown(files, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(Probe, "secondsPerStep", interrupted)
     assert accuracy.main([*files, "--output", str(tmp_path), *SMALL]) == 130
     printed = capsys.readouterr().out
-    assert "INTERRUPTED" in printed and "1e-01" in printed and "1e-02" in printed and "1e-03  " not in printed
+    begun = {line.split()[0] for line in printed.splitlines() if line.strip()}
+    assert "INTERRUPTED" in printed and {"1e-01", "1e-02"} <= begun and "1e-03" not in begun
     assert (tmp_path/"accuracy.png").exists()
     with open(tmp_path/"accuracy.csv") as file:
         assert [bool(row["best_s_per_step_without_forces"]) for row in csv.DictReader(file)] == [True, False]

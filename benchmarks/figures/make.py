@@ -21,9 +21,10 @@ import error
 import grid
 import scaling
 import splitting
+import targets
 from tqdm import tqdm
 
-FIGURES = {module.NAME: module for module in (error, grid, effects, scaling, splitting, baseline, conditioning)}
+FIGURES = {module.NAME: module for module in (error, grid, effects, scaling, splitting, baseline, conditioning, targets)}
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = ROOT / "docs" / "accuracy-and-speed.md"
 

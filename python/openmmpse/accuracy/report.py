@@ -23,9 +23,9 @@ def table(result):
     """One line for each tolerance and split."""
     if not result.rows:
         return ["nothing was measured"]
-    columns = ["tolerance", "random", "uniform", "scene", "noise", "xi (1/nm)", "grid", "P", "Lanczos", "ms/step",
+    columns = ["tolerance", "random", "uniform", "scene", "noise", "split", "xi (1/nm)", "grid", "P", "Lanczos", "ms/step",
                "no Forces", "particle-steps/s"]  # fmt: skip
-    widths = [9, 8, 8, 8, 8, 9, 12, 3, 7, 8, 9, 16]
+    widths = [9, 8, 8, 8, 8, 8, 9, 12, 3, 7, 8, 9, 16]
     lines = ["  ".join(f"{name:>{width}}" for name, width in zip(columns, widths))]
     for split in result.splits:
         chosen = result.recommendation(split)
@@ -33,7 +33,7 @@ def table(result):
         for row in result.rowsOf(split):
             used = row.parameters
             values = [f"{row.tolerance:.0e}", *(_number(row.errors.get(kind)) for kind in KINDS), _number(row.noise),
-                      f"{used['xi']:.4g}", "x".join(map(str, used["gridDimensions"])), str(used["windowSupport"]),
+                      used["split"], f"{used['xi']:.4g}", "x".join(map(str, used["gridDimensions"])), str(used["windowSupport"]),
                       str(used["lanczosIterations"]) if row.noise is not None else "-", _milliseconds(row.seconds),
                       _milliseconds(row.bareSeconds),
                       f"{result.count / row.seconds:.3g}" if row.seconds else "-"]  # fmt: skip
@@ -91,7 +91,7 @@ def writeCsv(result, path):
         for row in result.rows:
             chosen, limits = result.recommendation(row.split), result.limits
             writer.writerow([
-                row.split, f"{row.tolerance:.0e}", *(_full(row.errors.get(kind)) for kind in KINDS),
+                row.parameters["split"], f"{row.tolerance:.0e}", *(_full(row.errors.get(kind)) for kind in KINDS),
                 *(_full(row.plainErrors.get(kind)) for kind in KINDS), _full(row.lanczosError), _full(row.noise),
                 _full(row.seconds), _full(median(row.times)), _full(row.bareSeconds), _full(median(row.bareTimes)),
                 _full(result.count / row.seconds if row.seconds else None),

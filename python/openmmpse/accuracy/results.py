@@ -15,7 +15,7 @@ class Row:
     """One tolerance with one split. Errors are relative (docs/accuracy-and-speed.md), times are in seconds a step."""
 
     tolerance: float
-    split: str
+    split: str  #: asked for: "automatic" may lead to either, parameters["split"] is the one in use
     parameters: dict  #: as getNumericalParameters() returns them
     errors: dict  #: kind of forces -> |u - M f|/max(|M f|, |f|/(6 pi eta a))
     plainErrors: dict  #: kind of forces -> |u - M f|/|M f|

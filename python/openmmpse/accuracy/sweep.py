@@ -157,7 +157,7 @@ class Sweep:
                 refused.setdefault(str(error), []).append(f"{tolerance:g}")
                 self._advance(f"errors at {tolerance:g}, {split} split", 1 + self.rounds)
                 continue
-            row = self._errors(probe, tolerance)
+            row = self._errors(probe, tolerance, split)
             self.result.rows.append(row)
             self._clock(probe, row)  # a first round, so that an interruption leaves times as well
             self._advance(f"errors at {tolerance:g}, {split} split", 2)
@@ -175,7 +175,7 @@ class Sweep:
             raise openmm.OpenMMException(f"the library used the {used} split instead for this scene")
         return probe
 
-    def _errors(self, probe, tolerance):
+    def _errors(self, probe, tolerance, split):
         errors, plain = {}, {}
         for kind, forces in self._kinds.items():
             exact = self._exact[kind]
@@ -187,7 +187,7 @@ class Sweep:
         if self.scene.thermalEnergy > 0:
             lanczos = lanczosError(self.scene, probe)
             noise = plain["random"] + 2 * lanczos
-        return Row(tolerance, probe.parameters["split"], probe.parameters, errors, plain, lanczos, noise)
+        return Row(tolerance, split, probe.parameters, errors, plain, lanczos, noise)
 
     # ---- times ----
 
