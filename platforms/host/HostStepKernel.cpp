@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 
 using namespace PSE::numerics;
@@ -157,6 +158,11 @@ vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double sca
 
 void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what, const char* unit,
                                    const char* remedy) const {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& value : values)
+        sum += 0.0 * value; // not a number as soon as one of them is not finite
+    if (sum == Vec3::Zero())
+        return;
     for (size_t i = 0; i < values.size(); i++)
         if (!values[i].allFinite()) {
             std::ostringstream message;
@@ -168,11 +174,20 @@ void HostStepKernel::requireFinite(const vector<Vec3>& values, const char* what,
 }
 
 void HostStepKernel::checkPositions(ContextImpl&) {
+    const OmmVec3* box = data.periodicBoxVectors;
+    const double farthest = request ? FARTHEST * std::max({box[0][0], box[1][1], box[2][2]})
+                                    : std::numeric_limits<double>::max();
+    bool fine = true;
+    for (int i : scene.mobile) {
+        const OmmVec3& x = (*data.positions)[i];
+        for (int d = 0; d < 3; d++)
+            fine &= std::fabs(x[d]) <= farthest; // false for what is not a number
+    }
+    if (fine)
+        return;
     gather(*data.positions, positions);
     requireFinite(positions, "the position", "nm", "set finite positions");
-    const OmmVec3* box = data.periodicBoxVectors;
-    const double farthest = FARTHEST * std::max({box[0][0], box[1][1], box[2][2]});
-    for (size_t i = 0; i < positions.size() && request; i++)
+    for (size_t i = 0; i < positions.size(); i++)
         if (positions[i].cwiseAbs().maxCoeff() > farthest) {
             std::ostringstream message;
             message << "PSEBrownianIntegrator: particle " << scene.mobile[i] << " is "
