@@ -2,7 +2,7 @@
 """The targets of speed and memory: what was measured beside what must be met and what is aimed at."""
 import argparse
 
-from common import CYCLE, STYLE, markdown, panels, plt, save
+from common import CYCLE, STYLE, markdown, panels, plainTicks, plt, save
 
 import reach  # common has put its folder on the path
 
@@ -35,8 +35,10 @@ def draw(rows, path):
         axes.axvline(1, color="#444444", linewidth=1.2, label="must")
         axes.set(yticks=range(len(rows)), yticklabels=[row["what"] for row in reversed(rows)],
                  xlabel="times as good as it must be")
+        axes.set_xscale("log")
+        plainTicks(axis=axes.xaxis)
         axes.grid(False, axis="y")
-        axes.legend(loc="lower right")
+        axes.legend(loc="upper right")
         save(figure, path)
 
 
