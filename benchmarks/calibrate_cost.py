@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 import openmm
-import scenes
+import spheres as scenes
 
 FACTORS = (0.65, 0.8, 1.0, 1.2, 1.4)  # of the automatic splitting parameter
 NAMES = ("SPREAD", "PER PARTICLE (not in the model: no choice depends on it)", "GRID", "PAIR_BUILD", "PAIR_APPLY")

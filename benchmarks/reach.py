@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 
 import openmm
-from scenes import DRAG, MASS, RADIUS, STEP, TEMPERATURE, VISCOSITY, context, lattice, makeSystem
+from spheres import DRAG, MASS, RADIUS, STEP, TEMPERATURE, VISCOSITY, context, lattice, makeSystem
 
 from openmmpse import PSEBrownianIntegrator
 

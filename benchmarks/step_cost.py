@@ -11,7 +11,7 @@ import argparse
 import numpy as np
 import openmm
 
-import scenes
+import spheres as scenes
 
 
 def main():

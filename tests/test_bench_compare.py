@@ -5,6 +5,7 @@ import copy
 import importlib.util
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,11 @@ def script(name):
     """A script of the benchmarks as a module."""
     spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(FOLDER))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(FOLDER))
     return module
 
 
@@ -185,7 +190,7 @@ def testReachHasATargetForEveryRowItMeasures():
 @pytest.mark.parametrize("shuffled", [True, False])
 def testReachScenesAreSuspensions(shuffled):
     """The volume fraction asked for, all inside the box, and in the order of space or not."""
-    positions, length = reach.latticePositions(1000, 0.2, shuffled)
+    positions, length = reach.lattice(1000, 0.2, shuffled)
     assert len(positions) == 1000
     assert 1000*4/3*math.pi*reach.RADIUS**3/length**3 == pytest.approx(0.2)
     assert positions.min() > 0 and positions.max() < length

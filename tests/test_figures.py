@@ -17,8 +17,7 @@ pytestmark = pytest.mark.skipif(not FOLDER.exists(), reason="benchmarks are not 
 
 @pytest.fixture(scope="module")
 def figures():
-    """The module make.py with all others, imported under names that do not collide with those of the tests."""
-    own = {name: sys.modules.pop(name) for name in ("scenes",) if name in sys.modules}
+    """The module make.py with all others."""
     sys.path[:0] = [str(FOLDER), str(FOLDER.parent)]
     try:
         spec = importlib.util.spec_from_file_location("make", FOLDER/"make.py")
@@ -28,8 +27,6 @@ def figures():
     finally:
         for path in (FOLDER, FOLDER.parent):
             sys.path.remove(str(path))
-        sys.modules.pop("scenes", None)
-        sys.modules.update(own)
 
 
 def testSuspensionsHaveNoOverlaps(figures):

@@ -15,7 +15,7 @@ import openmm  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import scenes  # noqa: E402
+import spheres as scenes  # noqa: E402
 from openmmpse.accuracy import stages  # noqa: E402
 
 # Okabe and Ito's palette: told apart with any colour vision, and in grey by the markers.
