@@ -13,7 +13,6 @@ order" has neighbours in space next to each other in memory, as a program that h
 """
 import argparse
 import json
-import math
 import os
 import resource
 import statistics
@@ -317,6 +316,7 @@ def main():
         options.output.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     missed = [row["row"] + ("?" if row["doubtful"] else "") for row in rows if row["verdict"] == "MISSED"]
     print(f"Missed: {', '.join(missed)}" if missed else "All that must be is met.")
+    return int(any(row["verdict"] == "MISSED" and not row["doubtful"] for row in rows))
 
 
 if __name__ == "__main__":

@@ -145,9 +145,16 @@ Plan makePlan(const PlanRequest& request) {
     if (request.split == SplitChoice::Prolate ||
         (isPrescribed(request.overrides) && prolate->predictedError <= request.tolerance))
         return *prolate;
-    Plan other = hasimotoPlan(request, "because the cost model finds it cheaper here than the "
-                                       "prolate split, which would be valid");
     const bool keeps = prolate->predictedError <= request.tolerance;
+    Plan other;
+    try {
+        other = hasimotoPlan(request, "because the cost model finds it cheaper here than the "
+                                      "prolate split, which would be valid");
+    } catch (const std::invalid_argument&) {
+        if (!keeps)
+            throw;
+        return *prolate; // there is nothing to compare with
+    }
     if (!keeps && other.predictedError <= request.tolerance) {
         other.splitReason = "because the prolate split would miss the tolerance with what is "
                             "prescribed";

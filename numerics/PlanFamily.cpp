@@ -19,7 +19,7 @@ constexpr double LOCAL_VOLUME_FRACTION = 0.3;
 /// in radii: here sums have few terms, which integrals estimate only roughly
 constexpr double SMALL_BOX = 12;
 constexpr double SMALL_BOX_SHARE = 0.5; ///< of the budget, therefore
-/// and with a handful of terms, where only Hasimoto's split has room
+/// and with a handful of terms, for Hasimoto's split and its sums over images
 constexpr double TINY_BOX = 6, TINY_BOX_SHARE = 0.4;
 /// Radii. What the window does to waves longer than this is a fixed small share of the velocity
 /// that they carry, which the tolerance is relative to: farther pairs do not count. Not so in long
@@ -169,6 +169,12 @@ bool PlanFamily::fitGrid(Plan& plan, double unit, double& wave) const {
     };
     // In small boxes, with few modes, the estimate alone is not to be trusted with coarser grids.
     double low = (box.smallestWidth() < SMALL_BOX ? 1 : COARSEST), high = FINEST;
+    const auto widest = [&] {
+        const std::array<int, 3> grid = gridFor(high * unit, plan.windowSupport);
+        return *std::max_element(grid.begin(), grid.end());
+    };
+    while (high > low && widest() > WIDEST_GRID)
+        high = std::max(low, 0.95 * high);
     wave = evaluate(high);
     if (!(wave <= error))
         return false;
@@ -247,7 +253,7 @@ Plan HasimotoPlans::best() const {
             Plan plan = at(xi, cost);
             if (gridGiven) {
                 checkPlan(plan, request);
-                plan = finishedOrRefused(plan);
+                plan = finished(plan, nyquistOf(plan));
                 if (plan.predictedError > request.tolerance)
                     cost = plan.predictedError * 1e100;
             }

@@ -13,7 +13,7 @@
 
 namespace PSE::numerics {
 
-/// of the box: a neighbour list in single precision needs a margin below 1/2
+/// of the box: below 1/2 nearest images are unique, and there is a margin for rounding
 constexpr double LARGEST_LIST_RANGE = 0.499;
 /// grid points along one axis; beyond, nothing can be allocated
 constexpr double WIDEST_GRID = 32768;

@@ -115,7 +115,7 @@ std::string ProlatePlans::obstacleTo(double R) const {
 /** What keeps a Plan with a free grid from the tolerance, and what would help; else "". */
 std::string ProlatePlans::missedTolerance(const Plan& plan) const {
     std::ostringstream message;
-    const double dropped = plan.split->waveTruncation(FINEST * plan.bandwidth, phi);
+    const double dropped = plan.split->waveTruncation(FINEST * unitOf(plan), phi);
     if (request.overrides.grid[0] != 0 || plan.predictedError <= request.tolerance)
         return "";
     if (dropped > request.tolerance)

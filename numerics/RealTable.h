@@ -26,8 +26,8 @@ struct RealTable {
 };
 
 /**
- * @param maxError  absolute error allowed in either scalar, in 1/(6 pi eta a); 1e-13 is the floor
- * of the quadrature
+ * @param maxError  absolute error allowed in either scalar, in 1/(6 pi eta a); 1e-12 is the floor
+ * of Hasimoto's quadrature
  */
 RealTable makeRealTable(const Split& split, double rc, double maxError);
 

@@ -469,3 +469,15 @@ TEST(Plan, NextFftSizeIsTheSmallestProductOfSmallPrimes) {
         }
     }
 }
+
+TEST(Plan, APrescribedGridServesWhatItCanAtTheTightestTolerance) {
+    // Among the candidates are splitting parameters whose range is cut short: they must not refuse
+    // for the others.
+    for (SplitChoice split : {SplitChoice::Automatic, SplitChoice::Hasimoto}) {
+        PlanRequest r = with(split, request(Lattice::orthorhombic(20, 20, 20), 100, 1e-10));
+        r.overrides.grid = {128, 128, 128};
+        const Plan plan = makePlan(r);
+        EXPECT_LE(plan.predictedError, 1e-10);
+        EXPECT_EQ(plan.grid, r.overrides.grid);
+    }
+}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Brownian displacements by Positively Split Ewald against Lanczos on the full mobility (seed paper, Figs 5 and 6)."""
+"""Brownian displacements by Positively Split Ewald against Lanczos on the full mobility (Fiore et al. 2017, Figs 5 and 6)."""
 
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Condition number of the real half and its Lanczos iterations (seed paper, Fig. 1): they do not depend on N."""
+"""Condition number of the real half and its Lanczos iterations (Fiore et al. 2017, Fig. 1): they do not depend on N."""
 
 import realhalf
 from common import (

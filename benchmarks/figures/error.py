@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Error against tolerance: 5,000 spheres, phi = 0.2, against a run at 1e-10 (seed paper, Fig. 2)."""
+"""Error against tolerance: 5,000 spheres, phi = 0.2, against a run at 1e-10 (Fiore et al. 2017, Fig. 2)."""
 
 import numpy as np
 from common import CYCLE, SPLIT_STYLE, STYLE, markdown, panels, plt, save, scenes, splits, values, where

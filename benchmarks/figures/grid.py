@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Grid points of the Force Coupling Method against Positively Split Ewald (seed paper, Fig. 3): formulas and Plans.
+"""Grid points of the Force Coupling Method against Positively Split Ewald (Fiore et al. 2017, Fig. 3): formulas and Plans.
 
-FCM is not implemented here. Its grid follows from the seed's estimate (27) of the self mobility that is lost beyond a
+FCM is not implemented here. Its grid follows from that paper's estimate (27) of the self mobility that is lost beyond a
 cut-off k: (2a/pi) Int_k^inf s^2 dk, with s^2 = exp(-k^2 a^2/pi): erfc(k a/sqrt(pi)); or from the rule of practice, a
 spacing of a/3. The same estimate with s^2 = sinc^2(ka) (1 + q) exp(-q), q = k^2/4xi^2, gives the published curves.
 """

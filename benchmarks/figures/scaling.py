@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Particle-steps per second against N and phi, for suspensions and gels (seed paper, Figs 7 and 8, Table I)."""
+"""Particle-steps per second against N and phi, for suspensions and gels (Fiore et al. 2017, Figs 7 and 8, Table I)."""
 
 import numpy as np
 from common import (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Particle-steps per second against the splitting parameter (seed paper, Figs 4 and 7), the automatic choice marked."""
+"""Particle-steps per second against the splitting parameter (Fiore et al. 2017, Figs 4 and 7), the automatic choice marked."""
 
 import numpy as np
 import openmm

@@ -3,7 +3,6 @@
 #include "ParticleOrder.h"
 #include "numerics/RealTable.h"
 #include <algorithm>
-#include <cmath>
 
 using namespace PSE::numerics;
 
@@ -14,8 +13,8 @@ namespace {
 /// Cells along the last box vector per range: thin ones, because the cells of a run follow each
 /// other in memory and only its ends are searched in vain.
 constexpr int CELLS_PER_RANGE = 4;
-/// what rounding may do to the reach of the range, in fractions of the box
-constexpr double FRACTION_MARGIN = 1e-8;
+/// what rounding in single precision may do to a distance, relative to the range, and more
+constexpr double MARGIN = 1e-6;
 /// room for rows beyond the present need: they fluctuate from step to step
 constexpr double ROOM = 1.05;
 
@@ -94,7 +93,7 @@ template <class Real> void CpuRealSpace<Real>::findNeighbours(const std::vector<
 /** Columns of cells about as wide as the range; not many more cells than particles. */
 template <class Real> void CpuRealSpace<Real>::prepareCells(int particles) {
     for (int d = 0; d < 3; d++) {
-        reach[d] = range / width[d] + FRACTION_MARGIN;
+        reach[d] = (1 + MARGIN) * range / width[d];
         cellCount[d] = std::max(1, static_cast<int>((d < 2 ? 1 : CELLS_PER_RANGE) / reach[d]));
     }
     const int most = 2 * particles + 1;
@@ -137,7 +136,7 @@ template <class Real> int CpuRealSpace<Real>::findRuns(const Vec3& s, PairRun* r
         y2[j] = y.squaredDistance(j, s[1], width[1]);
     int n = 0;
     for (int i = 0; i < x.number; i++) {
-        const double left = range * range - x.squaredDistance(i, s[0], width[0]);
+        const double left = (1 + 2 * MARGIN) * range * range - x.squaredDistance(i, s[0], width[0]);
         const int* const row = cellStart.data() + size_t(x.cell(i)) * cellCount[1] * cellCount[2];
         for (int j = 0; j < y.number; j++) {
             if (!tilted && y2[j] >= left)
@@ -169,7 +168,7 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
             scratch.resize(candidates);
         const size_t needed = used + candidates / PAIR_LANES;
         if (mine.size() < needed) {
-            const double likely = ROOM * used / (i - from + 1) * (to - from);
+            const double likely = ROOM * used / std::max(1, i - from) * (to - from);
             mine.reserve(std::max(needed, static_cast<size_t>(likely)));
             mine.resize(mine.capacity());
         }

@@ -26,8 +26,10 @@ public:
     using Vector = std::vector<Real>;
 
     CpuRealSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
-    /** Bytes per particle and neighbour. */
-    static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES;
+    /** Bytes per particle and neighbour; per particle: half a block unused, ten vectors, places. */
+    static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES,
+                            BYTES_PER_PARTICLE =
+                                0.5 * sizeof(PairBlock<Real>) + 10 * 3 * sizeof(Real) + 64;
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts: those of placeParticles(), then

@@ -64,6 +64,10 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     prepareFactors(plan);
 }
 
+template <class Real> double CpuWaveSpace<Real>::bytesPerParticle(const Plan& plan) {
+    return 3.0 * (paddedSupport(plan.windowSupport) + 1) * sizeof(Real) + 5 * sizeof(int);
+}
+
 template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan) {
     const int ny = plan.grid[1], nz = plan.grid[2];
     const double plane = gridPlane(ny, gridRow(nz, plan.windowSupport)),
@@ -140,13 +144,20 @@ template <class Real> void CpuWaveSpace<Real>::sort() {
 template <class Real>
 void CpuWaveSpace<Real>::place(const std::vector<Vec3>& fractions, int from, int to) {
     Real offsets[3 * Threads::BLOCK];
-    for (int slot = from; slot < to; slot++)
+    for (int slot = from; slot < to; slot++) {
+        // Along x and y what assign() found: the column and the window must not disagree.
+        const int column = columnOf[order[slot]];
+        const Vec3& s = fractions[order[slot]];
+        int* const mine = first.data() + 3 * size_t(slot);
+        mine[0] = column / size[1];
+        mine[1] = column % size[1];
+        mine[2] = wrapped(2, windowStart(s[2] * size[2]));
         for (int d = 0; d < 3; d++) {
-            const double u = fractions[order[slot]][d] * size[d];
-            const int start = windowStart(u);
-            first[3 * size_t(slot) + d] = wrapped(d, start);
+            const double u = s[d] * size[d];
+            const int start = (mine[d] > u ? mine[d] - size[d] : mine[d]); // always below u
             offsets[3 * (slot - from) + d] = Real(2 * (start - u) + support - 1);
         }
+    }
     gridLoops.evaluateWindows({windowDegree, padded, windowCoefficients.data()}, offsets, to - from,
                               weights.data() + 3 * size_t(from) * padded);
 }

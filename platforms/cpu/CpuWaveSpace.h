@@ -24,6 +24,8 @@ public:
     CpuWaveSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per grid point of everything that grows with the grid. */
     static double bytesPerGridPoint(const numerics::Plan& plan);
+    /** Bytes per particle. */
+    static double bytesPerParticle(const numerics::Plan& plan);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts, those of placeParticles():

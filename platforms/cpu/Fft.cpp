@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "Fft.h"
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -55,11 +56,15 @@ template <class Real> GridFft<Real>::GridFft(const Layout& layout) {
                                          FFTW_FORWARD, FFTW_ESTIMATE);
     backwardColumn = Library::planComplex(1, &nx, width, b, NULL, width, 1, c, NULL, plane, 1,
                                           FFTW_BACKWARD, FFTW_ESTIMATE);
-    for (Plan plan : all())
-        if (plan == NULL)
+    for (Plan missing : all())
+        if (missing == NULL) {
+            for (Plan plan : all())
+                if (plan != NULL)
+                    Library::destroy(plan);
             throw std::runtime_error("the FFT library has no plan for a grid of " +
                                      std::to_string(nx) + " x " + std::to_string(ny) + " x " +
                                      std::to_string(nz) + " points; set other grid dimensions");
+        }
 }
 
 template <class Real> GridFft<Real>::~GridFft() {

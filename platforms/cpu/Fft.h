@@ -10,7 +10,6 @@
 #include <complex>
 #include <cstddef>
 #include <fftw3.h>
-#include <mutex>
 
 namespace PSE {
 

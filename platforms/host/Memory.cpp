@@ -18,14 +18,16 @@ void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, siz
     const double range = plan.realCutoff;
     const double neighbours = numerics::meanNeighbours(box, particles, range);
     const double pairs = use.perOrderedPair * particles * neighbours;
-    if (grid + pairs <= available)
+    const double rest = use.perParticle * particles;
+    if (grid + pairs + rest <= available)
         return;
     std::ostringstream message;
     message << "PSEBrownianIntegrator: this scene needs " << grid / GIGABYTE
             << " GB of memory for a grid of " << plan.grid[0] << " x " << plan.grid[1] << " x "
             << plan.grid[2] << " points and " << pairs / GIGABYTE << " GB for the " << neighbours
-            << " neighbours (images included) of each particle within " << range << " nm; "
-            << available / GIGABYTE << " GB can be used (80 % of the machine's); ";
+            << " neighbours (images included) of each particle within " << range << " nm, and "
+            << rest / GIGABYTE << " GB besides; " << available / GIGABYTE
+            << " GB can be used (80 % of the machine's); ";
     if (grid > pairs)
         message << "loosen the tolerance, choose a smaller splitting parameter or a smaller box";
     else

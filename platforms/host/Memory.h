@@ -11,6 +11,7 @@ namespace PSE {
 struct MemoryUse {
     double perGridPoint;
     double perOrderedPair; ///< per neighbour of a particle within the real-space range
+    double perParticle = 0;
 };
 
 /**

@@ -174,7 +174,7 @@ public:
      * Set the grid points per axis that one particle touches, in [3, 16], or 0 for automatic.
      */
     void setWindowSupport(int support);
-    /** Get what setNumericalParameters() and the three setters above asked for. */
+    /** Get what setNumericalParameters() and the setters above asked for. */
     const NumericalParameters& getRequestedNumericalParameters() const { return requested; }
     /**
      * Reproduce the Plan of another Context: give what its getNumericalParameters() returned.
