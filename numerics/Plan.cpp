@@ -2,6 +2,7 @@
 #include "numerics/Plan.h"
 #include "numerics/PlanFamily.h"
 #include "numerics/Window.h"
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -16,6 +17,9 @@ constexpr double SMALLEST_XI = 1e-6, LARGEST_XI = 4;
 constexpr double LARGEST_SHAPE = 60;
 /// in radii: the images within reach are (2/0.1)^3 per pair, and more below
 constexpr double SMALLEST_BOX = 0.1;
+/// widths of the box (and at least 8 radii): like forces in all images add up to what a tail that
+/// is cut off is not estimated for
+constexpr double FARTHEST_IMAGES = 4;
 constexpr double MOST_IMAGES = 1e6; ///< of one pair, when the range exceeds half the box
 constexpr double DENSEST = 100;     ///< volume fraction; beyond, the sums cancel too much
 
@@ -46,6 +50,14 @@ void checkPlan(const Plan& plan, const PlanRequest& request) {
     if (!plan.split) {
         message << "no numerical parameters fit a radius of " << request.radius
                 << " nm in this box; check the units of radius and box";
+        throw std::invalid_argument(message.str());
+    }
+    const double farthest = std::max(FARTHEST_IMAGES * request.box.smallestWidth(), 8 * plan.a);
+    if (request.overrides.xi > 0 && plan.sumImages && plan.realCutoff > farthest) {
+        message << "a splitting parameter of " << plan.xi << " /nm has a real-space range of "
+                << plan.realCutoff << " nm; sums over images farther than " << farthest
+                << " nm lose accuracy in this box; choose a larger splitting parameter, or 0 for "
+                   "the automatic one";
         throw std::invalid_argument(message.str());
     }
     if (plan.sumImages && request.box.imageCandidates(plan.realCutoff) > MOST_IMAGES) {

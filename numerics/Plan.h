@@ -98,6 +98,15 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
                  int windowSupport, double windowShape, double phi,
                  double extent = std::numeric_limits<double>::infinity());
 
+/**
+ * By how much the wave half magnifies the rounding of numbers on the grid: root mean square error
+ * of M f, for unit random forces at volume fraction phi, in 1/(6 pi eta a) and per unit of relative
+ * rounding. Rounding in a mode is divided by the window's transform once more than forces are.
+ * @param box  in radii
+ */
+double roundingAmplification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
+                             int windowSupport, double windowShape, double phi);
+
 } // namespace PSE::numerics
 
 #endif

@@ -32,6 +32,9 @@ constexpr double COARSEST = 0.85, GRID_PRECISION = 0.004;
 constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
 /// predicted error below which single precision would be the larger error, as a share of its floor
 constexpr double SINGLE_SHARE = 0.1;
+/// of the tolerance, for what the window makes of rounding in single precision
+constexpr double ROUNDING_SHARE = 0.1;
+constexpr double SINGLE_ROUNDING = 6e-8, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
 
 /**
@@ -146,8 +149,14 @@ double PlanFamily::realErrorOf(const Plan& plan) const {
 
 void PlanFamily::predict(Plan& plan, double wave) const {
     plan.predictedError = std::hypot(wave, realErrorOf(plan));
-    if (plan.predictedError < SINGLE_SHARE * request.singleFloor)
+    const double magnified = roundingAmplification(*plan.split, box, plan.grid, plan.windowSupport,
+                                                   plan.windowShape, phi);
+    if (plan.predictedError < SINGLE_SHARE * request.singleFloor ||
+        SINGLE_ROUNDING * magnified > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
+    plan.predictedError = std::hypot(
+        plan.predictedError,
+        magnified * (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING));
 }
 
 std::vector<int> PlanFamily::supports() const {

@@ -189,6 +189,18 @@ TEST(CpuEngine, RealHalfIsItsDefinitionOnEveryInstructionSet) {
     }
 }
 
+TEST(CpuEngine, DistancesWhoseSquaresUnderflowStayFinite) {
+    EngineScene scene = makeScene("images", Lattice::orthorhombic(8, 8, 8), 3, 1e-3);
+    scene.positions = {Vec3::Zero(), Vec3(1e-20, 0, 0), Vec3(0, 4, 0)};
+    PlanRequest request = {scene.box, 3, 1, 1e-3, true, 1e-5, false, {}, SplitChoice::Hasimoto};
+    request.overrides.xi = 0.5; // a range of more than half the box
+    scene.plan = makePlan(request);
+    ASSERT_TRUE(scene.plan.sumImages);
+    const std::vector<Vec3> exact = realVelocities(scene);
+    EXPECT_LT(realSpaceError<float>(scene, exact), 2e-6);
+    EXPECT_LT(realSpaceError<double>(scene, exact), 1e-12);
+}
+
 TEST(CpuEngine, EveryInstructionSetGivesTheSameStep) {
     const std::vector<int64_t> targets = runnableTargets();
     ASSERT_GE(targets.size(), 1u);

@@ -23,6 +23,8 @@ HWY_INLINE hn::Vec<D> polynomial(D d, const hn::TFromD<D>* coefficients, int deg
     return sum;
 }
 
+constexpr double SMALLEST_R2 = 1e-30; ///< in radii
+
 /** F and C of one block from its displacements; lanes from `used` on count for nothing. */
 template <class Real>
 HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, PairBlock<Real>& p) {
@@ -38,7 +40,8 @@ HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, Pair
         const auto waveF = polynomial(d, table.F, table.degreeF, t),
                    waveC = polynomial(d, table.C, table.degreeC, t);
         const auto r = hn::Sqrt(r2), s = hn::Div(one, r), s2 = hn::Mul(s, s);
-        // Both regimes, then a choice. At r = 0 the one that is not chosen is infinite.
+        // Both regimes, then a choice. At r = 0 the one that is not chosen is infinite, and C
+        // counts for nothing; so it does wherever 1/r^2 could overflow.
         const auto overlap = hn::Lt(r, constant(Rpy::CONTACT));
         const auto F = hn::IfThenElse(
             overlap, hn::MulAdd(constant(Rpy::OVERLAP_F1), r, one),
@@ -46,7 +49,8 @@ HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, Pair
         const auto G = hn::IfThenElse(
             overlap, hn::MulAdd(constant(Rpy::OVERLAP_G1), r, one),
             hn::Mul(s, hn::MulAdd(constant(Rpy::APART_G3), s2, constant(Rpy::APART_G1))));
-        const auto C = hn::IfThenElse(hn::Gt(r2, zero), hn::Mul(hn::Sub(G, F), s2), zero);
+        const auto C =
+            hn::IfThenElse(hn::Gt(r2, constant(SMALLEST_R2)), hn::Mul(hn::Sub(G, F), s2), zero);
         const int left = used - k; // in these lanes
         const auto inUse = hn::FirstN(d, left > 0 ? size_t(left) : 0);
         hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(F, waveF)), d, p.F + k);

@@ -2,7 +2,6 @@
 #include "ReferenceEngine.h"
 #include "numerics/Lanczos.h"
 #include "openmm/OpenMMException.h"
-#include "openmm/reference/ReferenceNeighborList.h"
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -99,27 +98,12 @@ void ReferenceEngine::addPair(int i, int j, const Vec3& d) {
     pairs.push_back({i, j, reduced, s.F, s.C});
 }
 
+/** All pairs, one by one: cheap beside the sums over modes, and evidently complete in any box. */
 void ReferenceEngine::listNeighbours() {
-    OpenMM::AtomLocationList locations;
-    for (const Vec3& x : positions)
-        locations.push_back(OpenMM::Vec3(x[0], x[1], x[2]));
-    OpenMM::Vec3 vectors[3];
-    for (int d = 0; d < 3; d++)
-        vectors[d] = OpenMM::Vec3(box.vectors()(0, d), box.vectors()(1, d), box.vectors()(2, d));
-    OpenMM::NeighborList list;
     const int n = static_cast<int>(positions.size());
-    const double margin = 1e-9 * plan.realCutoff; // the list's own rounding must not lose a pair
-    computeNeighborListVoxelHash(list, n, locations, std::vector<std::set<int>>(n), vectors, true,
-                                 plan.realCutoff + margin);
-    for (const auto& pair : list) {
-        const int i = static_cast<int>(std::min(pair.first, pair.second)),
-                  j = static_cast<int>(std::max(pair.first, pair.second));
-        addPair(i, j, box.minimumImage(positions[i] - positions[j]));
-    }
-    // The order of the list must not show in the last bits: a restart rebuilds it from the same
-    // positions.
-    std::sort(pairs.begin(), pairs.end(),
-              [](const Pair& p, const Pair& q) { return p.i < q.i || (p.i == q.i && p.j < q.j); });
+    for (int i = 0; i < n; i++)
+        for (int j = i + 1; j < n; j++)
+            addPair(i, j, box.minimumImage(positions[i] - positions[j]));
 }
 
 void ReferenceEngine::listImages() {
