@@ -62,6 +62,7 @@ struct Plan {
     double windowShape;      ///< beta
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
+    double windowError;      ///< absolute error allowed in the weights of the window
     double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
     Precision precision;
 
@@ -99,9 +100,10 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
                  double extent = std::numeric_limits<double>::infinity());
 
 /**
- * By how much the wave half magnifies the rounding of numbers on the grid: root mean square error
- * of M f, for unit random forces at volume fraction phi, in 1/(6 pi eta a) and per unit of relative
- * rounding. Rounding in a mode is divided by the window's transform once more than forces are.
+ * By how much the wave half magnifies small errors of numbers on the grid and of weights: root mean
+ * square error of M f, for unit random forces at volume fraction phi, in 1/(6 pi eta a) and per
+ * unit of relative error. What is wrong in a mode is divided by the window's transform once more
+ * than forces are.
  * @param box  in radii
  */
 double roundingAmplification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,

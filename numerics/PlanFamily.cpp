@@ -33,8 +33,11 @@ constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that mis
 /// predicted error below which single precision would be the larger error, as a share of its floor
 constexpr double SINGLE_SHARE = 0.1;
 /// of the tolerance, for what the window makes of rounding in single precision
-constexpr double ROUNDING_SHARE = 0.1;
-constexpr double SINGLE_ROUNDING = 6e-8, DOUBLE_ROUNDING = 1.2e-16;
+constexpr double ROUNDING_SHARE = 0.2;
+/// of windows by the rules, which the table's share of the budget covers
+constexpr double USUAL_MAGNIFICATION = 8;
+constexpr double SMALLEST_WINDOW_ERROR = 1e-12;
+constexpr double SINGLE_ROUNDING = 3e-7, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
 
 /**
@@ -154,9 +157,12 @@ void PlanFamily::predict(Plan& plan, double wave) const {
     if (plan.predictedError < SINGLE_SHARE * request.singleFloor ||
         SINGLE_ROUNDING * magnified > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
-    plan.predictedError = std::hypot(
-        plan.predictedError,
-        magnified * (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING));
+    const double usual = std::max(1.0, magnified / USUAL_MAGNIFICATION);
+    plan.windowError = std::max(SMALLEST_WINDOW_ERROR, plan.tableError / usual);
+    const double rounding =
+        (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);
+    plan.predictedError = std::hypot(plan.predictedError,
+                                     magnified * (rounding + (usual > 1 ? plan.windowError : 0)));
 }
 
 std::vector<int> PlanFamily::supports() const {

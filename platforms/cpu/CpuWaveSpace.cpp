@@ -55,7 +55,7 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     fft.reset(new GridFft<Real>({{size[0], size[1], size[2]}, rowLength, planeLength, WAVE_LANES}));
 
     const std::vector<Polynomial> pieces =
-        Window(support, plan.windowShape).polynomials(plan.tableError);
+        Window(support, plan.windowShape).polynomials(plan.windowError);
     windowDegree = pieces[0].degree();
     windowCoefficients.assign((windowDegree + 1) * padded, Real(0));
     for (int power = 0; power <= windowDegree; power++)
