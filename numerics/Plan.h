@@ -100,14 +100,18 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
                  double extent = std::numeric_limits<double>::infinity());
 
 /**
- * By how much the wave half magnifies small errors of numbers on the grid and of weights: root mean
- * square error of M f, for unit random forces at volume fraction phi, in 1/(6 pi eta a) and per
- * unit of relative error. What is wrong in a mode is divided by the window's transform once more
- * than forces are.
- * @param box  in radii
+ * What the wave half makes of small relative errors e of weights and of numbers on the grid: an
+ * error of M f of about first e + second e^2, for unit random forces at volume fraction phi, in
+ * 1/(6 pi eta a). Each error of a mode is divided by the window's transform once more than forces
+ * are: from spreading or from gathering (root mean square), or from both (in the self mobility).
  */
-double roundingAmplification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
-                             int windowSupport, double windowShape, double phi);
+struct Magnification {
+    double first, second;
+    double of(double error) const { return error * (first + error * second); }
+};
+/** @param box  in radii */
+Magnification magnification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
+                            int windowSupport, double windowShape, double phi);
 
 } // namespace PSE::numerics
 

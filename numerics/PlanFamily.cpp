@@ -152,17 +152,18 @@ double PlanFamily::realErrorOf(const Plan& plan) const {
 
 void PlanFamily::predict(Plan& plan, double wave) const {
     plan.predictedError = std::hypot(wave, realErrorOf(plan));
-    const double magnified = roundingAmplification(*plan.split, box, plan.grid, plan.windowSupport,
-                                                   plan.windowShape, phi);
+    const Magnification magnified =
+        magnification(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
     if (plan.predictedError < SINGLE_SHARE * request.singleFloor ||
-        SINGLE_ROUNDING * magnified > ROUNDING_SHARE * request.tolerance)
+        magnified.of(SINGLE_ROUNDING) > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
-    const double usual = std::max(1.0, magnified / USUAL_MAGNIFICATION);
+    const double usual =
+        std::max(1.0, magnified.of(plan.tableError) / plan.tableError / USUAL_MAGNIFICATION);
     plan.windowError = std::max(SMALLEST_WINDOW_ERROR, plan.tableError / usual);
     const double rounding =
         (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);
     plan.predictedError = std::hypot(plan.predictedError,
-                                     magnified * (rounding + (usual > 1 ? plan.windowError : 0)));
+                                     magnified.of(rounding + (usual > 1 ? plan.windowError : 0)));
 }
 
 std::vector<int> PlanFamily::supports() const {

@@ -107,8 +107,8 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
     return std::sqrt(density * 2 / 3 * pairs + self + truncation * truncation);
 }
 
-double roundingAmplification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
-                             int windowSupport, double windowShape, double phi) {
+Magnification magnification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
+                            int windowSupport, double windowShape, double phi) {
     constexpr int NODES = 16;
     const Quadrature rule = gaussLegendre(NODES, -M_PI, M_PI);
     const Window window(windowSupport, windowShape);
@@ -120,18 +120,19 @@ double roundingAmplification(const Split& split, const Lattice& box, const std::
         waves.col(d) *= grid[d];
     const double measure =
         double(grid[0]) * grid[1] * grid[2] / box.volume() / (8 * M_PI * M_PI * M_PI);
-    double sum = 0;
+    double squares = 0, self = 0;
     for (int i = 0; i < NODES; i++)
         for (int j = 0; j < NODES; j++)
             for (int l = 0; l < NODES; l++) {
                 const Vec3 k = waves * Vec3(rule.nodes[i], rule.nodes[j], rule.nodes[l]);
                 const double b =
                     6 * M_PI * split.waveWeight(k.norm()) / std::max(k.squaredNorm(), 1e-6);
-                const double magnified = b * inverse[i] * inverse[j] * inverse[l];
-                sum += measure * rule.weights[i] * rule.weights[j] * rule.weights[l] * magnified *
-                       magnified;
+                const double inverses = inverse[i] * inverse[j] * inverse[l],
+                             weight = measure * rule.weights[i] * rule.weights[j] * rule.weights[l];
+                squares += weight * b * b * inverses * inverses;
+                self += weight * b * inverses * inverses;
             }
-    return std::sqrt(3 * phi / (4 * M_PI) * 2 / 3 * sum);
+    return {std::sqrt(3 * phi / (4 * M_PI) * 2 / 3 * squares), 2.0 / 3 * self};
 }
 
 } // namespace PSE::numerics

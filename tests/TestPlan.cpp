@@ -491,8 +491,9 @@ TEST(Plan, WindowsThatMagnifyRoundingAskForDoublePrecision) {
     r.overrides.windowSupport = 16; // its transform is tiny at the end of this grid's band
     const Plan wide = makePlan(r);
     const auto magnified = [&](const Plan& plan) {
-        return roundingAmplification(*plan.split, r.box, plan.grid, plan.windowSupport,
-                                     plan.windowShape, 0.3);
+        return magnification(*plan.split, r.box, plan.grid, plan.windowSupport, plan.windowShape,
+                             0.3)
+            .first;
     };
     EXPECT_LT(magnified(usual), 1e3);
     EXPECT_GT(magnified(wide), 1e4);
