@@ -500,3 +500,17 @@ TEST(Plan, WindowsThatMagnifyRoundingAskForDoublePrecision) {
     EXPECT_EQ(wide.precision, Precision::Double);
     EXPECT_GE(wide.predictedError, 1e-16 * magnified(wide)); // told, where even that is not enough
 }
+
+TEST(Plan, ImageSumsThatLoseAccuracyAreRefusedWithTheRemedy) {
+    PlanRequest r = with(SplitChoice::Hasimoto, request(CUBE, 300, 1e-10));
+    r.overrides.xi = 0.05; // a range of more than four boxes
+    try {
+        makePlan(r);
+        FAIL() << "no refusal";
+    } catch (const std::invalid_argument& refusal) {
+        for (const char* word : {"0.05", "127.776", "80", "larger splitting parameter"})
+            EXPECT_NE(std::string(refusal.what()).find(word), std::string::npos) << refusal.what();
+    }
+    r.overrides.xi = 0; // the automatic one serves
+    EXPECT_LE(makePlan(r).predictedError, 1e-10);
+}
