@@ -235,3 +235,17 @@ TEST(CpuEngine, BitsDependNeitherOnThreadsNorOnEarlierPositions) {
         EXPECT_EQ(velocities(scene, 2, precision, &elsewhere), expected);
     }
 }
+
+TEST(CpuEngine, NoTimeIsChargedToNoiseThatIsAbsent) {
+    const EngineScene scene = makeScene("cube", Lattice::orthorhombic(24, 24, 24), 20, 1e-3);
+    OpenMM::ThreadPool pool(1);
+    StageClock clock;
+    const std::unique_ptr<MobilityEngine> engine =
+        makeEngine(scene, pool, clock, Precision::Single);
+    std::vector<Vec3> u;
+    engine->setPositions(scene.positions);
+    engine->computeVelocities(&scene.forces, NULL, u);
+    ASSERT_FALSE(clock.times().empty());
+    for (const StageTime& stage : clock.times())
+        EXPECT_EQ(std::string(stage.stage).find("Lanczos"), std::string::npos) << stage.stage;
+}

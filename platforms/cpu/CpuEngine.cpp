@@ -66,13 +66,14 @@ void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const T
     clock.start();
     const bool forced = largest > 0;
     const Real noise = Real(thermalForce / unit);
-    if (forced)
+    if (forced) {
         multiplyReal(*forces, unit);
-    clock.charge("real-space velocities");
+        clock.charge("real-space velocities");
+    }
     if (noise > 0)
         drawReal(*thermal);
     writeReal(forced, noise, unit / drag, u);
-    clock.charge("real-space noise (Lanczos)");
+    clock.charge(noise > 0 ? "real-space noise (Lanczos)" : "real-space velocities");
     waveSpace.addVelocities(forced, noise, noise > 0 ? thermal->wave : NoiseKey{}, unit / drag, u,
                             clock);
 }
