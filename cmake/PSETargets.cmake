@@ -57,7 +57,7 @@ function(pse_api_library target)
         FILES_MATCHING PATTERN "*.h")
 endfunction()
 
-# pse_plugin(<target> <folder> [<library>...]): the kernels of one platform
+# pse_plugin(<target> <folder> <library>...): the kernels of one platform
 # OpenMM loads plugins in the order of their length of name, so ours may precede the platform it
 # extends: the run path must lead to OpenMM's plugins as well as to the API library.
 function(pse_plugin target folder)
@@ -72,7 +72,7 @@ function(pse_plugin target folder)
         LIBRARY_OUTPUT_DIRECTORY ${PSE_PLUGIN_OUTPUT_DIR} INSTALL_RPATH "$ORIGIN:$ORIGIN/..")
     # The API library comes along even if no kernel calls it: it registers the XML proxy.
     target_link_options(${target} PRIVATE -Wl,--version-script=${exports} -Wl,--no-as-needed)
-    target_link_libraries(${target} PRIVATE psehost ${ARGN})
+    target_link_libraries(${target} PRIVATE ${ARGN})
     install(TARGETS ${target} LIBRARY DESTINATION ${PSE_LIBRARY_DIR}/plugins)
 endfunction()
 

@@ -3,6 +3,10 @@
 // linked.
 #include "OpenMM.h"
 #include "openmmpse/PSEBrownianIntegrator.h"
+#include "openmmpse/PSEKernels.h"
+#include "openmm/KernelFactory.h"
+#include "openmm/internal/ForceImpl.h"
+#include "openmm/reference/ReferencePlatform.h"
 #include <cmath>
 #include <cstdlib>
 #include <gtest/gtest.h>
@@ -45,7 +49,107 @@ double exactSelfMobility() {
     return 1 - 2.8372974794806 * c + 4 * M_PI / 3 * c * c * c;
 }
 
+/** A step that moves nothing and counts how often it hears of new positions. */
+class ListeningKernel : public PSE::IntegratePSEStepKernel {
+public:
+    ListeningKernel(const string& name, const Platform& platform, int& heard)
+        : IntegratePSEStepKernel(name, platform), heard(heard) {}
+    void initialize(ContextImpl&, const PSEBrownianIntegrator&, const PSE::Scene&) override {}
+    void positionsChanged() override { heard++; }
+    void checkPositions(ContextImpl&) override {}
+    void execute(ContextImpl&, const PSEBrownianIntegrator&) override {}
+    double computeKineticEnergy(ContextImpl&) override { return 0; }
+    vector<Vec3> applyMobility(ContextImpl&, const vector<Vec3>& forces) override { return forces; }
+    vector<Vec3> sampleBrownianDisplacements(ContextImpl&, const PSEBrownianIntegrator&,
+                                             int) override {
+        return {};
+    }
+    PSE::NumericalParameters getNumericalParameters() const override { return {}; }
+    vector<PSE::StageTime> getStageTimes() const override { return {}; }
+    void createCheckpoint(std::ostream&) const override {}
+    void loadCheckpoint(std::istream&) override { throw OpenMMException("refused"); }
+    void getCounters(unsigned long long& step, unsigned long long& sample) const override {
+        step = sample = 0;
+    }
+    void setCounters(unsigned long long, unsigned long long) override {}
+
+private:
+    int& heard;
+};
+
+/** A Force that tells at every second step, as a barostat would, that it has moved particles. */
+class MovingForce : public Force {
+public:
+    bool usesPeriodicBoundaryConditions() const override { return true; }
+
+protected:
+    ForceImpl* createImpl() const override { return new Impl(*this); }
+
+private:
+    struct Impl : ForceImpl {
+        explicit Impl(const Force& owner) : owner(owner) {}
+        void initialize(ContextImpl&) override {}
+        const Force& getOwner() const override { return owner; }
+        void updateContextState(ContextImpl&, bool& forcesInvalid) override {
+            forcesInvalid |= (++calls % 2 == 0);
+        }
+        double calcForcesAndEnergy(ContextImpl&, bool, bool, int) override { return 0; }
+        std::map<string, double> getDefaultParameters() override { return {}; }
+        vector<string> getKernelNames() override { return {}; }
+        const Force& owner;
+        int calls = 0;
+    };
+};
+
+class ListeningPlatform : public ReferencePlatform {
+public:
+    ListeningPlatform() {
+        registerKernelFactory(PSE::IntegratePSEStepKernel::Name(), new Factory(heard));
+    }
+    int heard = 0;
+
+private:
+    struct Factory : KernelFactory {
+        explicit Factory(int& heard) : heard(heard) {}
+        KernelImpl* createKernelImpl(string name, const Platform& platform,
+                                     ContextImpl&) const override {
+            return new ListeningKernel(name, platform, heard);
+        }
+        int& heard;
+    };
+};
+
 } // namespace
+
+TEST(PositionsChanged, IsToldToTheKernelWheneverSomethingButAStepSetsThem) {
+    ListeningPlatform platform;
+    System system = cubicSystem(2);
+    system.addForce(new MovingForce());
+    CustomExternalForce* gravity = new CustomExternalForce("g*x");
+    gravity->addGlobalParameter("g", 1);
+    system.addForce(gravity);
+    PSEBrownianIntegrator integrator(300, ETA, RADIUS, 0.1);
+    Context context(system, integrator, platform);
+    EXPECT_EQ(platform.heard, 0);
+    context.setPositions({Vec3(1, 2, 3), Vec3(4, 5, 6)});
+    EXPECT_EQ(platform.heard, 1);
+    context.setVelocities({Vec3(), Vec3()});
+    context.setParameter("g", 2);
+    EXPECT_EQ(platform.heard, 1);
+    integrator.step(1);
+    EXPECT_EQ(platform.heard, 1);
+    integrator.step(1);
+    EXPECT_EQ(platform.heard, 2);
+    std::stringstream checkpoint;
+    context.createCheckpoint(checkpoint);
+    // The kernel refuses its part, but the positions are new.
+    EXPECT_THROW(context.loadCheckpoint(checkpoint), OpenMMException);
+    EXPECT_EQ(platform.heard, 3);
+    context.reinitialize();
+    EXPECT_EQ(platform.heard, 3);
+    context.setPositions({Vec3(1, 2, 3), Vec3(4, 5, 6)});
+    EXPECT_EQ(platform.heard, 4);
+}
 
 TEST_P(CppApi, OneParticleInACubeHasTheExactMobility) {
     System system = cubicSystem(1);

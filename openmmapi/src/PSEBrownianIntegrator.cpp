@@ -243,8 +243,11 @@ void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
 }
 
 void PSEBrownianIntegrator::stateChanged(State::DataType changed) {
-    if (changed == State::Positions)
-        positionsSet = true;
+    if (changed != State::Positions)
+        return;
+    positionsSet = true;
+    if (context != NULL)
+        kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
 }
 
 void PSEBrownianIntegrator::cleanup() {
@@ -266,7 +269,8 @@ double PSEBrownianIntegrator::computeKineticEnergy() {
 void PSEBrownianIntegrator::step(int steps) {
     requireBound("step");
     for (int i = 0; i < steps; i++) {
-        context->updateContextState();
+        if (context->updateContextState())
+            kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
         kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
         context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
         kernel.getAs<IntegratePSEStepKernel>().execute(*context, *this);
@@ -314,6 +318,8 @@ void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
 }
 
 void PSEBrownianIntegrator::loadCheckpoint(std::istream& stream) {
+    // Positions are the checkpoint's by now, even if the rest of it is refused.
+    kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
     kernel.getAs<IntegratePSEStepKernel>().loadCheckpoint(stream);
 }
 

@@ -2,34 +2,13 @@
 #ifndef OPENMMPSE_MOBILITYENGINE_H_
 #define OPENMMPSE_MOBILITYENGINE_H_
 
-#include "numerics/Noise.h"
+#include "StageClock.h"
+#include "Thermal.h"
 #include "numerics/Plan.h"
-#include "openmmpse/internal/Scene.h"
-#include <chrono>
 #include <memory>
 #include <vector>
 
 namespace PSE {
-
-/** The thermal part of a step: u += sqrt(2 kT/dt) M^{1/2} z [T1]. */
-struct Thermal {
-    double kT, dt;                 ///< kJ/mol, ps
-    numerics::NoiseKey real, wave; ///< the noise of the two halves
-};
-
-/** Stage times, in the order in which the stages first ran. */
-class StageClock {
-public:
-    using Clock = std::chrono::steady_clock;
-    /** Charge the time since the last call (or start()) to a stage. */
-    void start() { last = Clock::now(); }
-    void charge(const char* stage);
-    const std::vector<StageTime>& times() const { return stages; }
-
-private:
-    Clock::time_point last;
-    std::vector<StageTime> stages;
-};
 
 /**
  * The mobility of the mobile particles on one platform. Vectors have one entry per mobile particle,

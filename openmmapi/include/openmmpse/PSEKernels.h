@@ -24,6 +24,13 @@ public:
      */
     virtual void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
                             const Scene& scene) = 0;
+    /**
+     * Positions were set by something other than a step: by the Context (setPositions, a State, a
+     * checkpoint, the minimizer) or by a Force (a barostat, which may change the box too). A
+     * platform that keeps what it derived from the positions, or its check of them, makes it anew;
+     * a change of the box alone is not told.
+     */
+    virtual void positionsChanged() {}
     /** Throw, naming the first non-finite position, before any Force sees it. */
     virtual void checkPositions(OpenMM::ContextImpl& context) = 0;
     /**

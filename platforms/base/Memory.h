@@ -14,12 +14,19 @@ struct MemoryUse {
     double perParticle = 0;
 };
 
+/** The memory that a Plan has to fit into. */
+struct Memory {
+    double bytes;
+    const char* owner; ///< whose it is: "machine", or "device"
+};
+Memory machineMemory();
+
 /**
  * Refuse a Plan before anything is allocated for it.
- * @throws OpenMMException naming the memory needed, the memory of the machine and what to change
+ * @throws OpenMMException naming the memory needed, the memory there is and what to change
  */
 void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, size_t particles,
-                   const MemoryUse& use);
+                   const MemoryUse& use, const Memory& memory = machineMemory());
 
 } // namespace PSE
 

@@ -8,12 +8,16 @@ namespace PSE {
 
 namespace {
 constexpr double GIGABYTE = 1e9;
-constexpr double USABLE = 0.8; ///< share of the machine's memory that may be taken
+constexpr double USABLE = 0.8; ///< share of the memory that may be taken
 } // namespace
 
+Memory machineMemory() {
+    return {sysconf(_SC_PHYS_PAGES) * double(sysconf(_SC_PAGESIZE)), "machine"};
+}
+
 void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, size_t particles,
-                   const MemoryUse& use) {
-    const double available = USABLE * sysconf(_SC_PHYS_PAGES) * double(sysconf(_SC_PAGESIZE));
+                   const MemoryUse& use, const Memory& memory) {
+    const double available = USABLE * memory.bytes;
     const double grid = use.perGridPoint * plan.gridPoints();
     const double range = plan.realCutoff;
     const double neighbours = numerics::meanNeighbours(box, particles, range);
@@ -26,8 +30,8 @@ void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, siz
             << " GB of memory for a grid of " << plan.grid[0] << " x " << plan.grid[1] << " x "
             << plan.grid[2] << " points and " << pairs / GIGABYTE << " GB for the " << neighbours
             << " neighbours (images included) of each particle within " << range << " nm, and "
-            << rest / GIGABYTE << " GB besides; " << available / GIGABYTE
-            << " GB can be used (80 % of the machine's); ";
+            << rest / GIGABYTE << " GB besides; " << available / GIGABYTE << " GB can be used ("
+            << 100 * USABLE << " % of the " << memory.owner << "'s); ";
     if (grid > pairs)
         message << "loosen the tolerance, choose a smaller splitting parameter or a smaller box";
     else

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "MobilityEngine.h"
+#include "StageClock.h"
 
 namespace PSE {
 

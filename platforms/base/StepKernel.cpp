@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: MIT
+#include "StepKernel.h"
+#include "openmmpse/internal/Units.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/internal/ContextImpl.h"
+#include "openmm/internal/OSRngSeed.h"
+#include <algorithm>
+#include <limits>
+#include <sstream>
+
+using namespace PSE::numerics;
+using OpenMM::ContextImpl;
+using OpenMM::OpenMMException;
+using std::string;
+using OmmVec3 = OpenMM::Vec3;
+
+namespace PSE {
+
+namespace {
+
+constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 1";
+/// Boxes from the origin: there a position is known to 1e-7 of the box.
+constexpr double FARTHEST = 1e9;
+constexpr uint64_t LARGEST_COUNTER = uint64_t(1) << 48;
+
+template <class T> void write(std::ostream& stream, const T& value) {
+    stream.write(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+template <class T> T read(std::istream& stream) {
+    T value;
+    stream.read(reinterpret_cast<char*>(&value), sizeof(T));
+    if (!stream)
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint ends early; it is truncated or was not written "
+            "with "
+            "PSEBrownianIntegrator. Create a new one with Context.createCheckpoint");
+    return value;
+}
+
+SplitChoice choiceOf(PSEBrownianIntegrator::Split split) {
+    switch (split) {
+    case PSEBrownianIntegrator::Prolate:
+        return SplitChoice::Prolate;
+    case PSEBrownianIntegrator::Hasimoto:
+        return SplitChoice::Hasimoto;
+    default:
+        return SplitChoice::Automatic;
+    }
+}
+
+string readText(std::istream& stream, size_t limit) {
+    const uint64_t length = read<uint64_t>(stream);
+    if (length > limit)
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint was not written with PSEBrownianIntegrator; "
+            "load it with the integrator that wrote it");
+    string text(length, ' ');
+    for (char& c : text)
+        c = read<char>(stream);
+    return text;
+}
+
+void writeText(std::ostream& stream, const string& text) {
+    write(stream, uint64_t(text.size()));
+    stream.write(text.data(), text.size());
+}
+
+} // namespace
+
+void refuseNotFinite(const CheckedQuantity& quantity, int particle, const Vec3& value) {
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: " << quantity.what << " of particle " << particle << " is ("
+            << value[0] << ", " << value[1] << ", " << value[2] << ") " << quantity.unit
+            << ", which is not finite; " << quantity.remedy;
+    throw OpenMMException(message.str());
+}
+
+void refuseFarAway(int particle, const Vec3& position) {
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: particle " << particle << " is "
+            << position.cwiseAbs().maxCoeff() << " nm from the origin, more than " << FARTHEST
+            << " boxes, and its place in the box is lost to rounding; set "
+            << "positions nearer to the box";
+    throw OpenMMException(message.str());
+}
+
+void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                                   const Scene& sceneSeen) {
+    scene = sceneSeen;
+    masses.clear();
+    for (int i = 0; i < context.getSystem().getNumParticles(); i++)
+        masses.push_back(context.getSystem().getParticleMass(i));
+    viscosity = integrator.getViscosity();
+    seed = integrator.getRandomNumberSeed();
+    while (seed == 0)
+        seed = osrngseed() & 0x7FFFFFFF; // positive, like the seeds that users write
+    if (!scene.hydrodynamics || scene.mobile.empty()) {
+        useFreeDraining();
+        return;
+    }
+    const NumericalParameters& wish = integrator.getRequestedNumericalParameters();
+    PlanOverrides overrides;
+    overrides.xi = wish.xi;
+    overrides.realCutoff = wish.realCutoff;
+    overrides.bandwidth = wish.prolateBandwidth;
+    for (int d = 0; d < 3; d++)
+        overrides.grid[d] = wish.gridDimensions[d];
+    overrides.windowSupport = wish.windowSupport;
+    overrides.windowShape = wish.windowShape;
+    overrides.lanczosTolerance = wish.lanczosTolerance;
+    request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
+                                  scene.radii[0], integrator.getErrorTolerance(),
+                                  integrator.getTemperature() > 0, 0, false, overrides,
+                                  choiceOf(integrator.getSplit())});
+    adapt(*request);
+    plan(request->box);
+}
+
+Lattice PlannedStepKernel::currentBox() const {
+    OmmVec3 box[3];
+    boxVectors(box);
+    try {
+        return Lattice(fromOpenMM(box[0]), fromOpenMM(box[1]), fromOpenMM(box[2]));
+    } catch (const std::invalid_argument& refusal) {
+        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
+    }
+}
+
+void PlannedStepKernel::plan(const Lattice& box) {
+    const Plan made = planFor(box);
+    useEngine(made, box);
+    currentPlan = made;
+    request->box = box;
+}
+
+bool PlannedStepKernel::followBox() {
+    if (!request)
+        return false;
+    const Lattice box = currentBox();
+    if (box == request->box)
+        return false;
+    plan(box);
+    return true;
+}
+
+double PlannedStepKernel::farthestPosition() const {
+    if (!request)
+        return std::numeric_limits<double>::max();
+    OmmVec3 box[3];
+    boxVectors(box);
+    return FARTHEST * std::max({box[0][0], box[1][1], box[2][2]});
+}
+
+Thermal PlannedStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sample) const {
+    const uint64_t counter = sample ? samples : steps;
+    const NoiseKey real = {uint32_t(seed), sample ? Stream::SampleReal : Stream::StepReal, counter};
+    const NoiseKey wave = {uint32_t(seed), sample ? Stream::SampleWave : Stream::StepWave, counter};
+    return {KT_PER_KELVIN * integrator.getTemperature(), integrator.getStepSize(), real, wave};
+}
+
+NumericalParameters PlannedStepKernel::parametersOf(const Plan& plan) const {
+    NumericalParameters p;
+    p.split = "none";
+    p.precision = precisionName(plan);
+    p.randomSeed = seed;
+    if (!request)
+        return p;
+    p.split = plan.split->name();
+    p.xi = plan.xi;
+    p.realCutoff = plan.realCutoff;
+    p.prolateBandwidth = plan.bandwidth;
+    p.splitReason = plan.splitReason;
+    for (int d = 0; d < 3; d++)
+        p.gridDimensions[d] = plan.grid[d];
+    p.windowSupport = plan.windowSupport;
+    p.windowShape = plan.windowShape;
+    p.lanczosTolerance = plan.lanczosTolerance;
+    p.lanczosIterations = lanczosIterations();
+    p.predictedError = plan.predictedError;
+    return p;
+}
+
+NumericalParameters PlannedStepKernel::getNumericalParameters() const {
+    return parametersOf(currentPlan);
+}
+
+Plan PlannedStepKernel::planFor(const Lattice& box) const {
+    PlanRequest changed = *request;
+    changed.box = box;
+    try {
+        return makePlan(changed);
+    } catch (const std::invalid_argument& refusal) {
+        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
+    }
+}
+
+string PlannedStepKernel::signature(const Plan& plan) const {
+    const NumericalParameters p = parametersOf(plan);
+    std::ostringstream text;
+    text.precision(17);
+    text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining") << ", viscosity "
+         << viscosity << " Da/(nm ps), first radius " << (scene.radii.empty() ? 0 : scene.radii[0])
+         << " nm, particles " << scene.mobile.size() << " of " << masses.size() << ", split "
+         << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff
+         << " nm, prolate bandwidth " << p.prolateBandwidth << ", grid " << p.gridDimensions[0]
+         << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
+         << p.windowSupport << ", window shape " << p.windowShape << ", Lanczos tolerance "
+         << p.lanczosTolerance << ", " << p.precision << " precision";
+    return text.str();
+}
+
+void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
+    writeText(stream, CHECKPOINT_MAGIC);
+    // The box may have changed since the last step: what counts is the Plan that the next step will
+    // use.
+    const bool stale = request && currentBox() != request->box;
+    writeText(stream, signature(stale ? planFor(currentBox()) : currentPlan));
+    write(stream, seed);
+    write(stream, steps);
+    write(stream, samples);
+}
+
+void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
+    const string magic = readText(stream, 256);
+    if (magic != CHECKPOINT_MAGIC)
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint is of another kind or version ('" + magic +
+            "'); this version reads '" + CHECKPOINT_MAGIC + "'");
+    const string theirs = readText(stream, 4096);
+    const int theirSeed = read<int>(stream);
+    const uint64_t theirSteps = read<uint64_t>(stream), theirSamples = read<uint64_t>(stream);
+    followBox(); // the box came with the checkpoint, and with it the Plan to compare
+    const string ours = signature(currentPlan);
+    if (theirs != ours)
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the checkpoint was written with other numerical parameters (" +
+            theirs + ") than this Context has (" + ours +
+            "); create the Context with the same settings, or give them "
+            "by setNumericalParameters. Positions, box and time of this Context are now the "
+            "checkpoint's");
+    seed = theirSeed;
+    steps = theirSteps;
+    samples = theirSamples;
+}
+
+void PlannedStepKernel::getCounters(unsigned long long& step, unsigned long long& sample) const {
+    step = steps;
+    sample = samples;
+}
+
+void PlannedStepKernel::setCounters(unsigned long long step, unsigned long long sample) {
+    if (step >= LARGEST_COUNTER || sample >= LARGEST_COUNTER)
+        throw OpenMMException("PSEBrownianIntegrator: the State holds a noise counter of 2^48 or "
+                              "more; it is damaged");
+    steps = step;
+    samples = sample;
+}
+
+} // namespace PSE

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_STEPKERNEL_H_
+#define OPENMMPSE_STEPKERNEL_H_
+
+// What every platform does alike, wherever its data live: the Plan and its renewal, the keys of the
+// noise, checkpoints, and the words of refusals.
+
+#include "StageClock.h"
+#include "Thermal.h"
+#include "numerics/Plan.h"
+#include "openmmpse/PSEKernels.h"
+#include <memory>
+
+namespace PSE {
+
+inline numerics::Vec3 fromOpenMM(const OpenMM::Vec3& v) {
+    return numerics::Vec3(v[0], v[1], v[2]);
+}
+
+/** What is checked for being finite, in the words of its refusal. */
+struct CheckedQuantity {
+    const char *what, *unit, *remedy;
+};
+constexpr CheckedQuantity POSITION = {"the position", "nm", "set finite positions"};
+constexpr CheckedQuantity FORCE = {
+    "the force", "kJ/(mol nm)", "check the Forces at these positions, or use a smaller step size"};
+constexpr CheckedQuantity GIVEN_FORCE = {"the given force", "kJ/(mol nm)", "give finite forces"};
+constexpr CheckedQuantity VELOCITY = {"the velocity", "nm/ps",
+                                      "its force is too large; use a smaller step size"};
+constexpr CheckedQuantity NEXT_POSITION = {"the next position", "nm", "use a smaller step size"};
+
+/** @param particle  index in the System. @throws OpenMMException always */
+[[noreturn]] void refuseNotFinite(const CheckedQuantity& quantity, int particle,
+                                  const numerics::Vec3& value);
+/** Refuse a position beyond PlannedStepKernel::farthestPosition(). @throws OpenMMException always
+ */
+[[noreturn]] void refuseFarAway(int particle, const numerics::Vec3& position);
+
+/** A step kernel with a Plan. A platform derives from it and says where its data are. */
+class PlannedStepKernel : public IntegratePSEStepKernel {
+public:
+    using IntegratePSEStepKernel::IntegratePSEStepKernel;
+    void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                    const Scene& scene) override;
+    NumericalParameters getNumericalParameters() const override;
+    std::vector<StageTime> getStageTimes() const override { return clock.times(); }
+    void createCheckpoint(std::ostream& stream) const override;
+    void loadCheckpoint(std::istream& stream) override;
+    void getCounters(unsigned long long& step, unsigned long long& sample) const override;
+    void setCounters(unsigned long long step, unsigned long long sample) override;
+
+protected:
+    /** The box of the Context, now. */
+    virtual void boxVectors(OpenMM::Vec3 box[3]) const = 0;
+    /** Fill in what the platform knows of the request: its precision and its costs. */
+    virtual void adapt(numerics::PlanRequest& request) const = 0;
+    /**
+     * Make whatever the Plan needs, in place of what there was; if it throws, the old one stays.
+     * @throws OpenMMException naming the memory needed and available, if the Plan does not fit
+     */
+    virtual void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) = 0;
+    /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
+    virtual void useFreeDraining() = 0;
+    /** Of the last thermal step. */
+    virtual int lanczosIterations() const = 0;
+    /** As getNumericalParameters() tells it; without a Plan, plan.split is NULL. */
+    virtual std::string precisionName(const numerics::Plan& plan) const = 0;
+
+    /**
+     * Make Plan and engine anew if the box has changed; on failure the old ones stay.
+     * @return whether it had
+     */
+    bool followBox();
+    /** The noise of the next step, or of the next sample. */
+    Thermal thermal(const PSEBrownianIntegrator& integrator, bool sample) const;
+    /** Largest coordinate (nm) that still tells a place in the box. */
+    double farthestPosition() const;
+
+    Scene scene;
+    std::vector<double> masses; ///< of all particles
+    double viscosity = 0;
+    StageClock clock;
+    uint64_t steps = 0, samples = 0; ///< thermal steps taken, samples drawn
+
+private:
+    numerics::Lattice currentBox() const;
+    numerics::Plan planFor(const numerics::Lattice& box) const;
+    void plan(const numerics::Lattice& box);
+    NumericalParameters parametersOf(const numerics::Plan& plan) const;
+    /** Everything that must agree for a checkpoint to continue exactly, in words. */
+    std::string signature(const numerics::Plan& plan) const;
+
+    /// NULL without hydrodynamics or mobile particles
+    std::unique_ptr<numerics::PlanRequest> request;
+    numerics::Plan currentPlan = {};
+    int seed = 0;
+};
+
+} // namespace PSE
+
+#endif
