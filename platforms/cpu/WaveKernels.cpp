@@ -16,7 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int LANES = WAVE_LANES;
 
-/** The last word of the counter block: see normals() of Noise.h. */
+/** The last word of the counter block: see indexWords() of NoiseText.h. */
 HWY_INLINE uint32_t lastWord(const numerics::NoiseKey& key, uint32_t part) {
     return (uint32_t(key.counter >> 32) & 0xFFFFu) | (part << 16);
 }
