@@ -61,7 +61,7 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     for (int power = 0; power <= windowDegree; power++)
         for (int j = 0; j < support; j++)
             windowCoefficients[(windowDegree - power) * padded + j] = Real(pieces[j].powers[power]);
-    prepareFactors(plan);
+    prepareFactors(WaveFactors(plan, box));
 }
 
 template <class Real> double CpuWaveSpace<Real>::bytesPerParticle(const Plan& plan) {
@@ -75,36 +75,17 @@ template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& p
     return (3 * plane + factors) * sizeof(Real) / (double(ny) * nz);
 }
 
-template <class Real> void CpuWaveSpace<Real>::prepareFactors(const Plan& plan) {
-    const Window window(support, plan.windowShape);
-    std::vector<double> inverse[3]; // 1/W^ of each axis
-    for (int d = 0; d < 3; d++)
-        for (int i = 0; i < size[d]; i++)
-            inverse[d].push_back(1 / window.transform(2 * M_PI * waveIndex(d, i) / size[d]));
-    const Matrix3 waves = a * box.waveVectors();
-    const double unit = 6 * M_PI * a * a * a / box.volume();
+template <class Real> void CpuWaveSpace<Real>::prepareFactors(const WaveFactors& waves) {
     keptChunks.assign(size[1], 0);
     threads.run(size[1], [&](int y, int) {
-        const int ny = waveIndex(1, y);
-        for (int x = 0; x < size[0]; x++) {
-            const int nx = waveIndex(0, x);
-            for (int nz = 0; nz < chunks * WAVE_LANES; nz++) {
-                const int chunk = nz / WAVE_LANES;
-                Real& factor = factors[factorRow(y, chunk, x) + nz % WAVE_LANES];
-                factor = 0;
-                // No mean flow, no Nyquist planes (there n and -n coincide on the grid but not in
-                // k), no padding.
-                const bool zero = (nx == 0 && ny == 0 && nz == 0);
-                if (zero || 2 * nx == size[0] || 2 * ny == size[1] || 2 * nz >= size[2])
-                    continue;
-                const double k = (waves * Vec3(nx, ny, double(nz))).norm();
-                const double deconvolution = inverse[0][x] * inverse[1][y] * inverse[2][nz];
-                factor = Real(unit * plan.split->waveWeight(k) / (k * k) * deconvolution *
-                              deconvolution);
+        for (int x = 0; x < size[0]; x++)
+            for (int z = 0; z < chunks * WAVE_LANES; z++) {
+                const int chunk = z / WAVE_LANES;
+                Real& factor = factors[factorRow(y, chunk, x) + z % WAVE_LANES];
+                factor = Real(waves(x, y, z)); // 0 for the padding, too
                 if (factor > 0)
                     keptChunks[y] = std::max(keptChunks[y], chunk + 1);
             }
-        }
     });
 }
 

@@ -9,6 +9,7 @@
 #include "WaveKernels.h"
 #include "numerics/Lattice.h"
 #include "numerics/Plan.h"
+#include "numerics/WaveFactors.h"
 #include <memory>
 #include <vector>
 
@@ -45,7 +46,7 @@ public:
 
 private:
     using Complex = std::complex<Real>;
-    void prepareFactors(const numerics::Plan& plan);
+    void prepareFactors(const numerics::WaveFactors& waves);
     size_t factorRow(int y, int chunk, int x) const {
         return ((size_t(y) * chunks + chunk) * size[0] + x) * WAVE_LANES;
     }

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_NUMERICS_WAVEFACTORS_H_
+#define OPENMMPSE_NUMERICS_WAVEFACTORS_H_
+
+#include "numerics/Plan.h"
+#include "numerics/Vec3.h"
+#include <array>
+#include <vector>
+
+namespace PSE::numerics {
+
+/**
+ * What turns gridded forces into gridded velocities, mode by mode [T4, T10]: the wave factor of the
+ * split over the volume, over the square of the window's transform.
+ */
+class WaveFactors {
+public:
+    WaveFactors(const Plan& plan, const Lattice& box);
+    /** Signed wave number of index i along axis d. */
+    int waveNumber(int d, int i) const { return 2 * i <= grid[d] ? i : i - grid[d]; }
+    /** k = waves n, in 1/a. */
+    const Matrix3& waves() const { return waveVectors; }
+    /**
+     * D of the mode with the wave numbers of indices x, y and z <= grid[2]/2, in 1/(6 pi eta a); 0
+     * for what no platform keeps: the mean flow and the Nyquist planes, where n and -n coincide on
+     * the grid but not in k.
+     */
+    double operator()(int x, int y, int z) const;
+
+private:
+    std::shared_ptr<const Split> split;
+    std::array<int, 3> grid;
+    Matrix3 waveVectors;
+    double unit;
+    std::vector<double> inverse[3]; ///< 1/W^ along each axis
+};
+
+} // namespace PSE::numerics
+
+#endif

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+#include "CommonStepKernel.h"
+#include "Memory.h"
+#include "openmm/OpenMMException.h"
+#include "openmm/common/ContextSelector.h"
+#include "openmm/common/IntegrationUtilities.h"
+#include "openmm/internal/ContextImpl.h"
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+using namespace PSE::numerics;
+using OpenMM::ContextImpl;
+using OpenMM::ContextSelector;
+using OpenMM::OpenMMException;
+using std::vector;
+using OmmVec3 = OpenMM::Vec3;
+
+namespace PSE {
+
+namespace {
+
+/** Single precision adds 4e-7 to the error of the fluid: from this tolerance on it is hidden. */
+constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
+/// kJ/(mol nm); OpenMM's fixed-point forces on devices hold 2^31, and so does what is not a number
+constexpr double LARGEST_FORCE = 1073741824.0;
+/// One step in so many is measured, besides the first few.
+constexpr int MEASURED_FIRST = 3, MEASURE_EVERY = 256;
+/// Kernels count grid points and window points with 32 bits.
+constexpr double LARGEST_INDEX = 2147483647.0;
+
+} // namespace
+
+CommonStepKernel::CommonStepKernel(std::string name, const OpenMM::Platform& platform,
+                                   OpenMM::ComputeContext& context, int devices)
+    : PlannedStepKernel(name, platform), device(context), numDevices(devices) {}
+
+CommonStepKernel::~CommonStepKernel() {
+    ContextSelector selector(device);
+    engine.reset();
+}
+
+void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                                  const Scene& sceneSeen) {
+    if (numDevices > 1)
+        throw OpenMMException(
+            "PSEBrownianIntegrator: the Context was asked to use " + std::to_string(numDevices) +
+            " devices, the limit is 1: the fluid couples all particles; name a single device in "
+            "the platform property DeviceIndex");
+    if (device.getMaxThreadBlockSize() < GROUP_SIZE)
+        throw OpenMMException("PSEBrownianIntegrator: this device runs work groups of at most " +
+                              std::to_string(device.getMaxThreadBlockSize()) + " threads, and " +
+                              std::to_string(GROUP_SIZE) +
+                              " are needed; use another device or the CPU platform");
+    device.initializeContexts();
+    ContextSelector selector(device);
+    PlannedStepKernel::initialize(context, integrator, sceneSeen);
+}
+
+void CommonStepKernel::boxVectors(OmmVec3 box[3]) const {
+    device.getPeriodicBoxVectors(box[0], box[1], box[2]);
+}
+
+void CommonStepKernel::adapt(PlanRequest& request) const {
+    request.singleFloor =
+        realIsDouble(device) ? std::numeric_limits<double>::infinity() : SINGLE_PRECISION_FLOOR;
+    request.directSums = false;
+}
+
+std::string CommonStepKernel::precisionName(const Plan&) const {
+    return device.getUseDoublePrecision()  ? "double"
+           : device.getUseMixedPrecision() ? "mixed"
+                                           : "single";
+}
+
+void CommonStepKernel::requireRoom(const Plan& plan, const Lattice& box) const {
+    std::ostringstream message;
+    if (plan.precision == Precision::Double && !realIsDouble(device))
+        message << "PSEBrownianIntegrator: these parameters (predicted error "
+                << plan.predictedError << ") need double precision, and this Context computes the "
+                << "fluid in single precision (" << precisionName(plan)
+                << "), which serves tolerances down to " << SINGLE_PRECISION_FLOOR
+                << "; set the platform property Precision to double, loosen the tolerance, or "
+                   "leave window and grid automatic";
+    const double windows = 3.0 * plan.windowSupport * scene.mobile.size();
+    if (message.str().empty() && std::max(plan.gridPoints(), windows) > LARGEST_INDEX)
+        message << "PSEBrownianIntegrator: this scene needs " << plan.gridPoints()
+                << " grid points and " << windows << " window weights, the limit on a device is "
+                << LARGEST_INDEX
+                << " each; loosen the tolerance, choose a smaller splitting parameter, a smaller "
+                   "box or fewer particles";
+    if (!message.str().empty())
+        throw OpenMMException(message.str());
+    // On a processor the device's memory is the machine's; of other devices OpenMM does not tell.
+    if (!device.getIsCPU())
+        return;
+    const int real = realSize(device);
+    const int neighbour = plan.sumImages ? 8 : 4;
+    requireMemory(plan, box, scene.mobile.size(),
+                  {DeviceWaveSpace::bytesPerGridPoint(plan, real), 1.5 * neighbour,
+                   DeviceWaveSpace::bytesPerParticle(plan, real) + 20.0 * 4 * real});
+}
+
+void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
+    requireRoom(plan, box);
+    std::unique_ptr<DeviceEngine> made(new DevicePeriodicEngine(
+        device, static_cast<int>(masses.size()), scene.mobile, plan, box, viscosity, clock));
+    engine = std::move(made);
+    stepsSinceStart = 0;
+}
+
+void CommonStepKernel::useFreeDraining() {
+    engine.reset(new DeviceFreeDraining(device, static_cast<int>(masses.size()), scene.mobile,
+                                        scene.radii, viscosity, clock));
+    stepsSinceStart = 0;
+}
+
+void CommonStepKernel::checkPositions(ContextImpl& context) {
+    if (positionsChecked)
+        return; // steps that would lead away from finite positions are refused
+    vector<OmmVec3> positions;
+    context.getPositions(positions);
+    const double farthest = farthestPosition();
+    for (int i : scene.mobile) {
+        const Vec3 x = fromOpenMM(positions[i]);
+        if (!x.allFinite())
+            refuseNotFinite(POSITION, i, x);
+        if (x.cwiseAbs().maxCoeff() > farthest)
+            refuseFarAway(i, x);
+    }
+    positionsChecked = true;
+}
+
+bool CommonStepKernel::measures() const {
+    return stepsSinceStart < MEASURED_FIRST || stepsSinceStart % MEASURE_EVERY == 0;
+}
+
+void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& integrator) {
+    ContextSelector selector(device);
+    followBox();
+    if (stepsSinceStart == 1)
+        clock = StageClock(); // the first step compiled and loaded what later ones only run
+    engine->clock().start(measures());
+    engine->setPositions();
+    engine->takeForces();
+    const Thermal noise = thermal(integrator, false);
+    engine->computeVelocities(true, noise.kT > 0 ? &noise : NULL);
+    const double dt = integrator.getStepSize();
+    checkStep(context, dt);
+    engine->move(dt);
+    device.getIntegrationUtilities().computeVirtualSites();
+    device.setTime(device.getTime() + dt);
+    device.setStepCount(device.getStepCount() + 1);
+    device.reorderAtoms();
+    steps++;
+    stepsSinceStart++;
+}
+
+/** Refuse, before anything moves, what is not finite or leads beyond where positions mean a place.
+ */
+void CommonStepKernel::checkStep(ContextImpl& context, double dt) const {
+    if (!(engine->largestForce() < LARGEST_FORCE))
+        refuseForce(context);
+    if (!std::isfinite(engine->largestVelocity()))
+        refuseVelocity(VELOCITY, dt);
+    const double largest = realIsDouble(device) ? std::numeric_limits<double>::max()
+                                                : std::numeric_limits<float>::max();
+    if (!(dt * engine->largestVelocity() < std::min(largest, farthestPosition())))
+        refuseVelocity(NEXT_POSITION, dt);
+}
+
+/** Name the first particle whose force the device cannot hold. */
+void CommonStepKernel::refuseForce(ContextImpl& context) const {
+    vector<OmmVec3> forces;
+    context.getForces(forces);
+    for (int i : scene.mobile) {
+        Vec3 force = fromOpenMM(forces[i]);
+        if (force.cwiseAbs().maxCoeff() < LARGEST_FORCE)
+            continue;
+        for (int c = 0; c < 3; c++) // what was not a number, the device has made a large one
+            if (std::fabs(force[c]) >= LARGEST_FORCE)
+                force[c] = std::copysign(std::numeric_limits<double>::infinity(), force[c]);
+        CheckedQuantity quantity = FORCE;
+        quantity.unit = "kJ/(mol nm) (beyond 2^30 on this platform, or not a number)";
+        refuseNotFinite(quantity, i, force);
+    }
+    throw OpenMMException("PSEBrownianIntegrator: a force on this device is not finite");
+}
+
+void CommonStepKernel::refuseVelocity(const CheckedQuantity& quantity, double dt) const {
+    int worst = -1;
+    Vec3 value = Vec3::Zero();
+    for (const auto& entry : engine->velocities()) {
+        const double size = entry.second.cwiseAbs().maxCoeff();
+        const bool bad = !std::isfinite(size) || !(dt * size < farthestPosition());
+        if (bad && (worst < 0 || entry.first < worst)) {
+            worst = entry.first;
+            value = entry.second;
+        }
+    }
+    refuseNotFinite(quantity, worst, value);
+}
+
+double CommonStepKernel::computeKineticEnergy(ContextImpl&) {
+    ContextSelector selector(device);
+    return device.getIntegrationUtilities().computeKineticEnergy(0);
+}
+
+/** What the engine computed last, by particle of the System. */
+vector<OmmVec3> CommonStepKernel::velocities(double scale) const {
+    vector<OmmVec3> all(masses.size());
+    for (const auto& entry : engine->velocities())
+        all[entry.first] = scale * OmmVec3(entry.second[0], entry.second[1], entry.second[2]);
+    return all;
+}
+
+vector<OmmVec3> CommonStepKernel::applyMobility(ContextImpl&, const vector<OmmVec3>& given) {
+    double largest = 0;
+    for (int i : scene.mobile) {
+        const Vec3 force = fromOpenMM(given[i]);
+        if (!force.allFinite())
+            refuseNotFinite(GIVEN_FORCE, i, force);
+        largest = std::max(largest, force.cwiseAbs().maxCoeff());
+    }
+    ContextSelector selector(device);
+    followBox();
+    if (largest == 0)
+        return vector<OmmVec3>(masses.size());
+    // over the largest: forces of any size fit single precision
+    vector<double> scaled(4 * masses.size(), 0.0);
+    for (int i : scene.mobile)
+        for (int c = 0; c < 3; c++)
+            scaled[4 * i + c] = given[i][c] / largest;
+    engine->clock().start(false);
+    engine->setPositions();
+    engine->takeForces(scaled);
+    engine->computeVelocities(true, NULL);
+    return velocities(largest);
+}
+
+vector<OmmVec3>
+CommonStepKernel::sampleBrownianDisplacements(ContextImpl&, const PSEBrownianIntegrator& integrator,
+                                              int count) {
+    ContextSelector selector(device);
+    followBox();
+    engine->clock().start(false);
+    engine->setPositions();
+    vector<OmmVec3> all;
+    all.reserve(masses.size() * count);
+    for (int i = 0; i < count; i++) {
+        const Thermal noise = thermal(integrator, true);
+        if (noise.kT > 0) {
+            engine->computeVelocities(false, &noise);
+            samples++;
+        }
+        const vector<OmmVec3> displacements =
+            noise.kT > 0 ? velocities(noise.dt) : vector<OmmVec3>(masses.size());
+        all.insert(all.end(), displacements.begin(), displacements.end());
+    }
+    return all;
+}
+
+} // namespace PSE

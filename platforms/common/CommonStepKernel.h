@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_COMMONSTEPKERNEL_H_
+#define OPENMMPSE_COMMONSTEPKERNEL_H_
+
+// One step of Brownian dynamics for the platforms that keep positions and forces on a device: they
+// share the kernels, written in OpenMM's Common compute dialect, and all code that launches them.
+
+#include "DeviceEngine.h"
+#include "StepKernel.h"
+#include "openmm/common/ComputeContext.h"
+
+namespace PSE {
+
+class CommonStepKernel : public PlannedStepKernel {
+public:
+    /** @param devices  how many the Context was asked to use */
+    CommonStepKernel(std::string name, const OpenMM::Platform& platform,
+                     OpenMM::ComputeContext& context, int devices);
+    ~CommonStepKernel() override;
+    void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
+                    const Scene& scene) override;
+    void positionsChanged() override { positionsChecked = false; }
+    void checkPositions(OpenMM::ContextImpl& context) override;
+    void execute(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator) override;
+    double computeKineticEnergy(OpenMM::ContextImpl& context) override;
+    std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context,
+                                            const std::vector<OpenMM::Vec3>& forces) override;
+    std::vector<OpenMM::Vec3> sampleBrownianDisplacements(OpenMM::ContextImpl& context,
+                                                          const PSEBrownianIntegrator& integrator,
+                                                          int count) override;
+
+protected:
+    void boxVectors(OpenMM::Vec3 box[3]) const override;
+    void adapt(numerics::PlanRequest& request) const override;
+    void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) override;
+    void useFreeDraining() override;
+    int lanczosIterations() const override { return engine->lanczosIterations(); }
+    std::string precisionName(const numerics::Plan& plan) const override;
+
+private:
+    void requireRoom(const numerics::Plan& plan, const numerics::Lattice& box) const;
+    bool measures() const;
+    void checkStep(OpenMM::ContextImpl& context, double dt) const;
+    [[noreturn]] void refuseForce(OpenMM::ContextImpl& context) const;
+    [[noreturn]] void refuseVelocity(const CheckedQuantity& quantity, double dt) const;
+    std::vector<OpenMM::Vec3> velocities(double scale) const;
+
+    OpenMM::ComputeContext& device;
+    int numDevices;
+    std::unique_ptr<DeviceEngine> engine;
+    bool positionsChecked = false;
+    int stepsSinceStart = 0; ///< with this engine; some of them are measured
+};
+
+} // namespace PSE
+
+#endif

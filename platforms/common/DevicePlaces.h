@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_DEVICEPLACES_H_
+#define OPENMMPSE_DEVICEPLACES_H_
+
+#include "DeviceArrays.h"
+#include "openmm/common/ComputeSort.h"
+#include "numerics/Lattice.h"
+#include <vector>
+
+namespace PSE {
+
+/**
+ * The mobile particles sorted by cells of the box, anew for every step: Brownian steps are so long
+ * that a list of neighbours with a skin would hardly outlive one. Their places depend on positions
+ * alone.
+ */
+class DevicePlaces {
+public:
+    /**
+     * @param particles   in the System
+     * @param mobile      indices of those that move
+     * @param range       of the real-space half, for which cells are made (nm); 0 for no cells:
+     * particles then stay in their own order
+     */
+    DevicePlaces(OpenMM::ComputeContext& context, int particles, const std::vector<int>& mobile,
+                 const numerics::Lattice& box, double range);
+    /** Follow the positions of the Context. */
+    void update();
+
+    int count() const { return numMobile; }
+    const OpenMM::mm_int4& cells() const { return cellCount; }
+    OpenMM::ComputeArray& places() { return placeArray; } ///< fractions, index in the System
+    OpenMM::ComputeArray& slots() { return slotAt; }      ///< in OpenMM's arrays
+    OpenMM::ComputeArray& cellStarts() { return cellStart; }
+    /** Index in the System of the particle at each place. */
+    std::vector<int> particles() const;
+
+private:
+    void chooseCells(const numerics::Lattice& box, double range);
+    void sortByCells();
+    void keepOrder();
+
+    OpenMM::ComputeContext& context;
+    int numParticles, numMobile;
+    bool inCells;
+    OpenMM::mm_int4 cellCount = {1, 1, 1, 0};
+    OpenMM::ComputeArray isMobile, particleAt, inverseBox, located, keys, slotOf;
+    OpenMM::ComputeArray placeArray, slotAt, cellStart;
+    OpenMM::ComputeSort sort;
+    DeviceKernel locateParticles, placeParticles, findCells, findSlots, placeInOrder;
+};
+
+} // namespace PSE
+
+#endif

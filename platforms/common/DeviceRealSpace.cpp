@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#include "DeviceRealSpace.h"
+#include "numerics/Lanczos.h"
+#include "numerics/RealTable.h"
+#include "numerics/Rpy.h"
+#include <cmath>
+#include <cstdint>
+
+using namespace OpenMM;
+using namespace PSE::numerics;
+
+namespace PSE {
+
+namespace {
+
+/// room for neighbours beyond their mean number: structure and fluctuations, then what is found
+constexpr double ROOM = 1.5, MORE_ROOM = 1.2;
+constexpr int LEAST_ROOM = 16;
+constexpr int FIRST_ITERATIONS = 5; ///< of a first step
+/// in radii squared; below, 1/r^2 is not needed and might overflow
+constexpr double SMALLEST_R2 = 1e-30;
+/// of the range, in units of the box: what rounding of fractions may do, and more
+constexpr double REACH_MARGIN = 1e-6;
+/// Degrees are rounded up to multiples of this, so that few programs serve many Plans.
+constexpr int DEGREE_UNIT = 4;
+
+int roundedDegree(const Polynomial& p) {
+    return (p.degree() + DEGREE_UNIT - 1) / DEGREE_UNIT * DEGREE_UNIT;
+}
+
+/** Append coefficients, highest power first, for a degree that may be higher than p's. */
+void appendCoefficients(const Polynomial& p, int degree, std::vector<double>& all) {
+    all.insert(all.end(), degree - p.degree(), 0.0);
+    all.insert(all.end(), p.powers.rbegin(), p.powers.rend());
+}
+
+} // namespace
+
+mm_int4 kernelKey(const NoiseKey& key) {
+    return mm_int4(static_cast<int>(key.seed), static_cast<int>(key.stream),
+                   static_cast<int>(uint32_t(key.counter)),
+                   static_cast<int>(uint32_t(key.counter >> 32)));
+}
+
+int DeviceRealSpace::summaryRows() {
+    return 2 * LanczosTridiagonal::MAX_ITERATIONS + 1;
+}
+
+DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, const Lattice& box,
+                                 DevicePlaces& places, StepSummary& summary)
+    : context(context), places(places), summary(summary), lanczosTolerance(plan.lanczosTolerance),
+      // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
+      negativeTolerance(std::max(2 * plan.predictedError, 1e-10)), sumImages(plan.sumImages) {
+    const int n = places.count();
+    const double mean = meanNeighbours(box, n, plan.realCutoff);
+    capacity = static_cast<int>(std::min(ROOM * mean + LEAST_ROOM, 1e9));
+    const RealTable table = makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError);
+    const int degreeF = roundedDegree(table.F), degreeC = roundedDegree(table.C);
+    std::vector<double> values;
+    appendCoefficients(table.F, degreeF, values);
+    appendCoefficients(table.C, degreeC, values);
+    uploadReals(tables, context, values, "pseTables");
+    prepareGeometry(plan, box);
+    counts.initialize<int>(context, n, "pseCounts");
+
+    using c = RpyCoefficients;
+    Defines defines = {{"DEGREE_F", std::to_string(degreeF)},
+                       {"DEGREE_C", std::to_string(degreeC)},
+                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
+                       {"CONTACT", context.doubleToString(c::CONTACT)},
+                       {"APART_F1", context.doubleToString(c::APART_F1)},
+                       {"APART_F3", context.doubleToString(c::APART_F3)},
+                       {"APART_G1", context.doubleToString(c::APART_G1)},
+                       {"APART_G3", context.doubleToString(c::APART_G3)},
+                       {"OVERLAP_F1", context.doubleToString(c::OVERLAP_F1)},
+                       {"OVERLAP_G1", context.doubleToString(c::OVERLAP_G1)}};
+    const Matrix3& v = box.vectors();
+    if (sumImages)
+        defines["SUM_IMAGES"] = "1";
+    else if (v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0)
+        defines["TILTED"] = "1";
+    const ComputeProgram program = realSpaceProgram(context, defines);
+    findKernel = DeviceKernel(context, program, "findNeighbours");
+    multiplyReal = DeviceKernel(context, program, "multiplyReal");
+    drawNoise = DeviceKernel(context, program, "drawNoise");
+    expandBasis = DeviceKernel(context, program, "expandBasis");
+    makeOrthogonal = DeviceKernel(context, program, "makeOrthogonal");
+    combineBasis = DeviceKernel(context, program, "combineBasis");
+    coefficients.initialize(context, LanczosTridiagonal::MAX_ITERATIONS, realSize(context),
+                            "pseCoefficients");
+}
+
+/** What realSpace.cc calls geometry, in that order; the images of the box, if they are summed. */
+void DeviceRealSpace::prepareGeometry(const Plan& plan, const Lattice& box) {
+    const Matrix3 v = box.vectors() / plan.a;
+    const double unit = realIsDouble(context) ? std::ldexp(1.0, -64) : std::ldexp(1.0, -32);
+    const double rc = plan.realCutoff / plan.a;
+    std::vector<double> values = {unit * v(0, 0), unit * v(0, 1), unit * v(1, 1), unit * v(0, 2),
+                                  unit * v(1, 2), unit * v(2, 2), v(0, 0),        v(0, 1),
+                                  v(1, 1),        rc * rc,        2 / (rc * rc)};
+    values.push_back(makeRealTable(*plan.split, rc, plan.tableError).self);
+    for (int d = 0; d < 3; d++)
+        values.push_back(
+            std::min((1 + REACH_MARGIN) * plan.realCutoff / box.width(d) + REACH_MARGIN, 0.9));
+    uploadReals(geometry, context, values, "pseGeometry");
+    if (!sumImages)
+        return;
+    std::vector<double> vectors;
+    for (const numerics::Vec3& image : box.imagesWithin(plan.realCutoff)) {
+        const double other = image == numerics::Vec3::Zero() ? 0 : 1;
+        vectors.insert(vectors.end(),
+                       {image[0] / plan.a, image[1] / plan.a, image[2] / plan.a, other});
+        numImages++;
+    }
+    images.initialize(context, numImages, 4 * realSize(context), "pseImages");
+    if (realIsDouble(context))
+        images.upload(vectors.data());
+    else
+        images.upload(std::vector<float>(vectors.begin(), vectors.end()).data());
+}
+
+void DeviceRealSpace::findNeighbours() {
+    const int n = places.count();
+    const int entry = sumImages ? sizeof(mm_int2) : sizeof(int);
+    reserve(neighbours, context, size_t(capacity) * n, entry, "pseNeighbours");
+    if (sumImages)
+        findKernel(n, n, capacity, numImages, places.places(), images, geometry, neighbours, counts,
+                   summary.maxima());
+    else
+        findKernel(n, n, capacity, places.cells(), places.places(), places.cellStarts(), geometry,
+                   neighbours, counts, summary.maxima());
+}
+
+bool DeviceRealSpace::hadRoom() {
+    const double most = summary.maximum(StepSummary::Neighbours);
+    if (most <= capacity)
+        return true;
+    capacity = static_cast<int>(MORE_ROOM * most);
+    return false;
+}
+
+/** Launch a kernel that begins with MATRIX_PARAMETERS. */
+template <class... Arguments>
+void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments) {
+    const int n = places.count();
+    if (sumImages)
+        kernel(n, n, places.places(), images, neighbours, counts, geometry, tables, arguments...);
+    else
+        kernel(n, n, places.places(), neighbours, counts, geometry, tables, arguments...);
+}
+
+void DeviceRealSpace::multiply(ComputeArray& f, ComputeArray& u) {
+    withMatrix(multiplyReal, f, u);
+}
+
+int DeviceRealSpace::startSquareRoot(const NoiseKey& key) {
+    noise = key;
+    done = 0;
+    const int expected = iterations > 0 ? iterations : FIRST_ITERATIONS;
+    reserve(basis, context, size_t(expected + 1) * places.count(), 4 * realSize(context),
+            "pseBasis");
+    drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), basis,
+              summary.partialSums());
+    iterate(0, expected);
+    return 2 * expected + 1;
+}
+
+void DeviceRealSpace::iterate(int from, int to) {
+    for (int i = from; i < to; i++) {
+        withMatrix(expandBasis, i, basis, summary.partialSums());
+        makeOrthogonal(places.count(), places.count(), i, basis, summary.partialSums());
+    }
+    done = to;
+}
+
+void DeviceRealSpace::addSquareRoot(double amplitude, ComputeArray& u) {
+    LanczosTridiagonal small(lanczosTolerance, negativeTolerance);
+    const auto norm = [this](int i) { return std::sqrt(summary.sum(2 * i)); };
+    for (bool finished = false; !finished;) {
+        const int i = small.iterations();
+        if (i == done) {
+            const size_t needed = size_t(done + 2) * places.count();
+            if (basis.getSize() < needed) { // more room loses what there is: the same once more
+                iterations = std::min(done + 1 + done / 2, LanczosTridiagonal::MAX_ITERATIONS);
+                startSquareRoot(noise);
+            } else
+                iterate(done, done + 1);
+            summary.read(2 * done + 1);
+        }
+        if (norm(0) == 0)
+            return;
+        finished = small.add(summary.sum(2 * i + 1) / norm(i), norm(i + 1));
+    }
+    iterations = small.iterations();
+    std::vector<double> weights(coefficients.getSize(), 0.0);
+    for (int i = 0; i < iterations; i++)
+        weights[i] = amplitude * norm(0) * small.coefficients()[i] / norm(i);
+    coefficients.upload(weights, true);
+    combineBasis(places.count(), places.count(), iterations, basis, coefficients, u);
+}
+
+} // namespace PSE

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include "DeviceWaveSpace.h"
+#include "DevicePrograms.h"
+#include "DeviceRealSpace.h"
+#include "numerics/WaveFactors.h"
+#include "numerics/Window.h"
+#include "openmm/internal/ThreadPool.h"
+#include <atomic>
+
+using namespace OpenMM;
+using namespace PSE::numerics;
+
+namespace PSE {
+
+namespace {
+
+/** Threads that gather for one particle: a power of two. */
+int lanesFor(int support) {
+    return support <= 4 ? 4 : (support <= 8 ? 8 : 16);
+}
+
+/** Points of a half-complex grid. */
+size_t numModes(const mm_int4& size) {
+    return size_t(size.x) * size.y * (size.z / 2 + 1);
+}
+
+} // namespace
+
+DeviceWaveSpace::DeviceWaveSpace(ComputeContext& context, const Plan& plan, const Lattice& box,
+                                 DevicePlaces& places)
+    : context(context), places(places), size(plan.grid[0], plan.grid[1], plan.grid[2], 0),
+      support(plan.windowSupport), lanes(lanesFor(plan.windowSupport)) {
+    const int n = places.count();
+    const std::vector<Polynomial> pieces =
+        Window(support, plan.windowShape).polynomials(plan.windowError);
+    const int degree = pieces[0].degree();
+    std::vector<double> table((degree + 1) * support);
+    for (int power = 0; power <= degree; power++)
+        for (int j = 0; j < support; j++)
+            table[(degree - power) * support + j] = pieces[j].powers[power];
+    uploadReals(coefficients, context, table, "pseWindow");
+    starts.initialize<mm_int4>(context, n, "pseStarts");
+    weights.initialize(context, size_t(3) * support * n, realSize(context), "pseWeights");
+    // The transform uses its input as workspace: both need room for complex numbers.
+    for (int c = 0; c < 3; c++) {
+        grids[c].initialize(context, 2 * numModes(size), realSize(context), "pseGrid");
+        modes[c].initialize(context, numModes(size), 2 * realSize(context), "pseModes");
+    }
+    fft = context.createFFT(size.x, size.y, size.z, true);
+    prepareFactors(plan, box);
+    const ComputeProgram program =
+        waveSpaceProgram(context, {{"SUPPORT", std::to_string(support)},
+                                   {"WINDOW_DEGREE", std::to_string(degree)},
+                                   {"LANES", std::to_string(lanes)}});
+    windowKernel = DeviceKernel(context, program, "evaluateWindows");
+    spreadForces = DeviceKernel(context, program, "spreadForces");
+    scaleWaves = DeviceKernel(context, program, "scaleWaves");
+    gatherVelocities = DeviceKernel(context, program, "gatherVelocities");
+}
+
+double DeviceWaveSpace::bytesPerGridPoint(const Plan& plan, int realSize) {
+    // three grids, three of modes, the factors; a half-complex row has two reals more than points
+    const double row = plan.grid[2];
+    return realSize * 6.5 * (row + 2) / row;
+}
+
+double DeviceWaveSpace::bytesPerParticle(const Plan& plan, int realSize) {
+    return 3.0 * plan.windowSupport * realSize + sizeof(mm_int4);
+}
+
+void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
+    const WaveFactors exact(plan, box);
+    std::vector<double> values(numModes(size));
+    const int sizeZ = size.z / 2 + 1;
+    std::atomic<int> next(0);
+    context.getThreadPool().execute([&](ThreadPool&, int) {
+        for (int x = next++; x < size.x; x = next++)
+            for (int y = 0; y < size.y; y++)
+                for (int z = 0; z < sizeZ; z++)
+                    values[(size_t(x) * size.y + y) * sizeZ + z] = exact(x, y, z);
+    });
+    context.getThreadPool().waitForThreads();
+    uploadReals(factors, context, values, "pseFactors");
+    std::vector<double> vectors;
+    for (int i = 0; i < 9; i++)
+        vectors.push_back(exact.waves()(i / 3, i % 3));
+    uploadReals(waves, context, vectors, "pseWaves");
+}
+
+void DeviceWaveSpace::evaluateWindows() {
+    const int n = places.count();
+    windowKernel(3 * support * n, n, size, places.places(), coefficients, starts, weights);
+}
+
+void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKey& key,
+                                    ComputeArray& u, DeviceClock& clock) {
+    const int all = context.getNumThreadBlocks() * GROUP_SIZE;
+    if (f != NULL) {
+        spreadForces(all, size, places.cells(), places.cellStarts(), starts, weights, *f, grids[0],
+                     grids[1], grids[2]);
+        clock.charge("spreading");
+        for (int c = 0; c < 3; c++)
+            fft->execFFT(grids[c], modes[c], true);
+        clock.charge("Fourier transforms");
+    }
+    scaleWaves(all, size, f != NULL ? 1 : 0, Real{noise}, kernelKey(key), waves, factors, modes[0],
+               modes[1], modes[2]);
+    clock.charge(noise != 0 ? "waves (noise and scaling)" : "waves (scaling)");
+    for (int c = 0; c < 3; c++)
+        fft->execFFT(modes[c], grids[c], false);
+    clock.charge("Fourier transforms");
+    gatherVelocities(lanes * places.count(), places.count(), size, starts, weights, grids[0],
+                     grids[1], grids[2], u);
+    clock.charge("gathering");
+}
+
+} // namespace PSE

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_DEVICEWAVESPACE_H_
+#define OPENMMPSE_DEVICEWAVESPACE_H_
+
+#include "DeviceClock.h"
+#include "DevicePlaces.h"
+#include "numerics/Noise.h"
+#include "numerics/Plan.h"
+#include "openmm/common/FFT3D.h"
+
+namespace PSE {
+
+/**
+ * The wave-space half on a device [T4, T9, T10]: spread by the Kaiser-Bessel window, transform,
+ * scale (forced and thermal part together), transform back, gather. Mobilities in units of
+ * 1/(6 pi eta a), vectors by place.
+ */
+class DeviceWaveSpace {
+public:
+    DeviceWaveSpace(OpenMM::ComputeContext& context, const numerics::Plan& plan,
+                    const numerics::Lattice& box, DevicePlaces& places);
+    /** Bytes of reals of one size for each grid point, and for each particle. */
+    static double bytesPerGridPoint(const numerics::Plan& plan, int realSize);
+    static double bytesPerParticle(const numerics::Plan& plan, int realSize);
+
+    /** Windows at the places as they are now. */
+    void evaluateWindows();
+    /**
+     * u += M_W f + noise M_W^{1/2} z
+     * @param f      NULL: none
+     * @param noise  amplitude, 0 for none
+     */
+    void addVelocities(OpenMM::ComputeArray* f, double noise, const numerics::NoiseKey& key,
+                       OpenMM::ComputeArray& u, DeviceClock& clock);
+
+private:
+    void prepareFactors(const numerics::Plan& plan, const numerics::Lattice& box);
+
+    OpenMM::ComputeContext& context;
+    DevicePlaces& places;
+    OpenMM::mm_int4 size;
+    int support, lanes;
+    OpenMM::ComputeArray coefficients, starts, weights, factors, waves;
+    OpenMM::ComputeArray grids[3], modes[3];
+    OpenMM::FFT3D fft;
+    DeviceKernel windowKernel, spreadForces, scaleWaves, gatherVelocities;
+};
+
+} // namespace PSE
+
+#endif

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#include "StepSummary.h"
+#include "DevicePrograms.h"
+
+namespace PSE {
+
+StepSummary::StepSummary(OpenMM::ComputeContext& context, int particles, int sums)
+    : context(context), groups(groupsFor(context, particles)) {
+    largest.initialize(context, NUM_MAXIMA * groups, realSize(context), "pseLargest");
+    partial.initialize(context, std::max(1, sums * groups), mixedSize(context), "psePartialSums");
+    summary.initialize(context, NUM_MAXIMA + sums, mixedSize(context), "pseSummary");
+    context.clearBuffer(largest);
+    context.clearBuffer(partial);
+    summarise = DeviceKernel(context, particleProgram(context), "summarise");
+}
+
+void StepSummary::read(int sums) {
+    summarise((NUM_MAXIMA + sums) * GROUP_SIZE, sums, groups, largest, partial, summary);
+    summary.download(values, true);
+}
+
+} // namespace PSE

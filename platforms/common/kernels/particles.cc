@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// Between OpenMM's arrays, in its order of slots, and ours, in the order of places: particles sorted
+// by cells of the box and, within a cell, by their index in the System. Places depend on positions
+// alone, not on the order of slots, and with them every sum below.
+
+/** Fractions and sorting keys of all particles; those that do not move come last. */
+KERNEL void locateParticles(int numAtoms, int4 cells, GLOBAL const real4* RESTRICT posq,
+        GLOBAL const int* RESTRICT atomIndex, GLOBAL const int* RESTRICT isMobile,
+        GLOBAL const mixed* RESTRICT inverseBox, GLOBAL fraction4* RESTRICT located,
+        GLOBAL mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT slotOf
+#ifdef USE_MIXED_PRECISION
+        , GLOBAL const real4* RESTRICT posqCorrection
+#endif
+        ) {
+    for (int slot = GLOBAL_ID; slot < numAtoms; slot += GLOBAL_SIZE) {
+        const real4 p = posq[slot];
+        mixed x = p.x, y = p.y, z = p.z;
+#ifdef USE_MIXED_PRECISION
+        const real4 correction = posqCorrection[slot];
+        x += correction.x;
+        y += correction.y;
+        z += correction.z;
+#endif
+        const int particle = atomIndex[slot];
+        fraction4 s;
+        s.x = toFraction(inverseBox[0]*x+inverseBox[1]*y+inverseBox[3]*z);
+        s.y = toFraction(inverseBox[2]*y+inverseBox[4]*z);
+        s.z = toFraction(inverseBox[5]*z);
+        s.w = particle;
+        int cell = cells.x*cells.y*cells.z;
+        if (isMobile[particle])
+            cell = (cellOf(s.x, cells.x)*cells.y+cellOf(s.y, cells.y))*cells.z+cellOf(s.z, cells.z);
+        located[slot] = s;
+        keys[slot] = ((mm_ulong) cell << 32) | (unsigned int) particle;
+        slotOf[particle] = slot;
+    }
+}
+
+/** From sorted keys, what is at each place. */
+KERNEL void placeParticles(int n, GLOBAL const mm_ulong* RESTRICT keys, GLOBAL const int* RESTRICT slotOf,
+        GLOBAL const fraction4* RESTRICT located, GLOBAL fraction4* RESTRICT places, GLOBAL int* RESTRICT slotAt) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        const int slot = slotOf[(unsigned int) keys[place]];
+        places[place] = located[slot];
+        slotAt[place] = slot;
+    }
+}
+
+/** First place of every cell, and n after the last. */
+KERNEL void findCells(int n, int numCells, GLOBAL const mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT cellStart) {
+    for (int cell = GLOBAL_ID; cell <= numCells; cell += GLOBAL_SIZE) {
+        int low = 0, high = n;
+        while (low < high) {
+            const int middle = low+(high-low)/2;
+            if ((keys[middle] >> 32) < (mm_ulong) cell)
+                low = middle+1;
+            else
+                high = middle;
+        }
+        cellStart[cell] = low;
+    }
+}
+
+/** Slots of the particles in their own order, where nothing needs to be sorted. */
+KERNEL void findSlots(int numAtoms, GLOBAL const int* RESTRICT atomIndex, GLOBAL int* RESTRICT slotOf) {
+    for (int slot = GLOBAL_ID; slot < numAtoms; slot += GLOBAL_SIZE)
+        slotOf[atomIndex[slot]] = slot;
+}
+
+KERNEL void placeInOrder(int n, GLOBAL const int* RESTRICT particleAt, GLOBAL const int* RESTRICT slotOf,
+        GLOBAL fraction4* RESTRICT places, GLOBAL int* RESTRICT slotAt) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        fraction4 s;
+        s.x = s.y = s.z = 0;
+        s.w = particleAt[place];
+        places[place] = s;
+        slotAt[place] = slotOf[particleAt[place]];
+    }
+}
+
+/**
+ * OpenMM's forces, fixed-point numbers in units of 2^-32 kJ/(mol nm), by place.
+ * @param largest  per group, the largest component; those beyond 2^30 and what was not a number
+ * count as 2^31
+ */
+KERNEL void takeForces(int n, int stride, GLOBAL const mm_long* RESTRICT forces,
+        GLOBAL const int* RESTRICT slotAt, GLOBAL real4* RESTRICT f, GLOBAL real* RESTRICT largest) {
+    LOCAL real buffer[GROUP_SIZE];
+    const mm_long limit = (mm_long) 1 << 62;
+    real most = 0;
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        const int slot = slotAt[place];
+        const mm_long x = forces[slot], y = forces[slot+stride], z = forces[slot+2*stride];
+        if (x > limit || -limit > x || y > limit || -limit > y || z > limit || -limit > z)
+            most = (real) 2147483648.0;
+        const real unit = (real) (1/4294967296.0);
+        const real4 force = make_real4(unit*x, unit*y, unit*z, 0);
+        f[place] = force;
+        most = larger(most, largestOf(force));
+    }
+    most = largestInGroup(buffer, most);
+    if (LOCAL_ID == 0)
+        largest[LARGEST_FORCE*NUM_GROUPS+GROUP_ID] = most;
+}
+
+/** Forces given by particle, by place. */
+KERNEL void takeGivenForces(int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const real4* RESTRICT given,
+        GLOBAL real4* RESTRICT f) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE)
+        f[place] = given[places[place].w];
+}
+
+/** Largest component per group; not a number stays so. */
+KERNEL void checkVelocities(int n, GLOBAL const real4* RESTRICT u, GLOBAL real* RESTRICT largest) {
+    LOCAL real buffer[GROUP_SIZE];
+    real most = 0;
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE)
+        most = larger(most, largestOf(u[place]));
+    most = largestInGroup(buffer, most);
+    if (LOCAL_ID == 0)
+        largest[LARGEST_VELOCITY*NUM_GROUPS+GROUP_ID] = most;
+}
+
+/**
+ * Without hydrodynamics, u = mobility f + sqrt(mobility) noise z [T2].
+ * @param mobility  by particle
+ */
+KERNEL void drainFreely(int n, int forced, real noise, int4 key, GLOBAL const fraction4* RESTRICT places,
+        GLOBAL const real* RESTRICT mobility, GLOBAL const real4* RESTRICT f, GLOBAL real4* RESTRICT u) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        const unsigned int particle = (unsigned int) places[place].w;
+        real4 velocity = make_real4(0, 0, 0, 0);
+        if (forced) {
+            const real4 force = f[place];
+            velocity = make_real4(mobility[particle]*force.x, mobility[particle]*force.y, mobility[particle]*force.z, 0);
+        }
+        if (noise != 0) {
+            const real amplitude = noise*SQRT(mobility[particle]);
+            real z[3];
+            particleNoise(key.x, key.y, key.z, key.w, particle, z);
+            velocity.x += amplitude*z[0];
+            velocity.y += amplitude*z[1];
+            velocity.z += amplitude*z[2];
+        }
+        u[place] = velocity;
+    }
+}
+
+/**
+ * Advance positions by dt unit u; velocities become unit u.
+ * @param unit  of u, in nm/ps
+ */
+KERNEL void moveParticles(int n, mixed dt, mixed unit, GLOBAL const int* RESTRICT slotAt,
+        GLOBAL const real4* RESTRICT u, GLOBAL real4* RESTRICT posq, GLOBAL mixed4* RESTRICT velm
+#ifdef USE_MIXED_PRECISION
+        , GLOBAL real4* RESTRICT posqCorrection
+#endif
+        ) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        const int slot = slotAt[place];
+        const real4 own = u[place];
+        mixed4 velocity = velm[slot];
+        velocity.x = unit*own.x;
+        velocity.y = unit*own.y;
+        velocity.z = unit*own.z;
+        velm[slot] = velocity;
+        real4 p = posq[slot];
+#ifdef USE_MIXED_PRECISION
+        real4 rest = posqCorrection[slot];
+        const mixed x = p.x+(mixed) rest.x+dt*velocity.x, y = p.y+(mixed) rest.y+dt*velocity.y,
+                z = p.z+(mixed) rest.z+dt*velocity.z;
+        p.x = (real) x;
+        p.y = (real) y;
+        p.z = (real) z;
+        rest.x = (real) (x-p.x);
+        rest.y = (real) (y-p.y);
+        rest.z = (real) (z-p.z);
+        posqCorrection[slot] = rest;
+#else
+        p.x += dt*velocity.x;
+        p.y += dt*velocity.y;
+        p.z += dt*velocity.z;
+#endif
+        posq[slot] = p;
+    }
+}

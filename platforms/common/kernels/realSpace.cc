@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: MIT
+// The real-space half: M_R = F (I - rr) + G rr as F I + C d d^T, from rows of neighbours, and the
+// Lanczos process for its square root [T7, T18]. Lengths in radii, mobilities in 1/(6 pi eta a).
+// A thread owns a row and adds its neighbours in their order: no sum is shared between threads.
+
+// places in the array of geometry, lengths in radii
+#define BOX 0    // x of a, b; y of b; x, y, z of c, per unit of fractions
+#define WHOLE 6  // x of a, b; y of b
+#define RANGE2 9
+#define SCALE 10 // of t = scale r^2 - 1
+#define SELF 11
+#define REACH 12 // range as a fraction of the box widths, three numbers
+
+/** From b to a: the nearest image, or with SUM_IMAGES the one of wrapped fractions. */
+DEVICE real4 displacement(fraction4 a, fraction4 b, GLOBAL const real* RESTRICT geometry) {
+    const real sx = (real) (signedFraction) (a.x-b.x), sy = (real) (signedFraction) (a.y-b.y),
+            sz = (real) (signedFraction) (a.z-b.z);
+    GLOBAL const real* RESTRICT box = geometry+BOX;
+    real4 d = make_real4(box[0]*sx+box[1]*sy+box[3]*sz, box[2]*sy+box[4]*sz, box[5]*sz, 0);
+#if defined(TILTED) && !defined(SUM_IMAGES)
+    // the nearest fractions are not always the nearest image there
+    GLOBAL const real* RESTRICT whole = geometry+WHOLE;
+    const real nb = floor(d.y/whole[2]+(real) 0.5);
+    d.y -= nb*whole[2];
+    d.x -= nb*whole[1];
+    d.x -= floor(d.x/whole[0]+(real) 0.5)*whole[0];
+#endif
+    return d;
+}
+
+DEVICE real lengthSquared(real4 d) {
+    return d.x*d.x+d.y*d.y+d.z*d.z;
+}
+
+#ifdef SUM_IMAGES
+/** Every image of every pair in range: few particles, or a range never chosen automatically. */
+KERNEL void findNeighbours(int n, int capacity, int numImages, GLOBAL const fraction4* RESTRICT places,
+        GLOBAL const real4* RESTRICT images, GLOBAL const real* RESTRICT geometry,
+        GLOBAL int2* RESTRICT neighbours, GLOBAL int* RESTRICT counts, GLOBAL real* RESTRICT largest) {
+    LOCAL real buffer[GROUP_SIZE];
+    real most = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        const fraction4 own = places[i];
+        int found = 0;
+        for (int j = 0; j < n; j++) {
+            const real4 d = displacement(own, places[j], geometry);
+            for (int m = 0; m < numImages; m++) {
+                const real4 image = images[m];
+                const real4 r = make_real4(d.x+image.x, d.y+image.y, d.z+image.z, 0);
+                if (lengthSquared(r) < geometry[RANGE2] && (i != j || image.w != 0)) {
+                    if (found < capacity)
+                        neighbours[found*(mm_long) n+i] = make_int2(j, m);
+                    found++;
+                }
+            }
+        }
+        counts[i] = found < capacity ? found : capacity;
+        most = larger(most, (real) found);
+    }
+    most = largestInGroup(buffer, most);
+    if (LOCAL_ID == 0)
+        largest[MOST_NEIGHBOURS*NUM_GROUPS+GROUP_ID] = most;
+}
+#else
+/**
+ * Rows of neighbours from the cells around each particle, [k][i].
+ * @param counts   neighbours kept, at most `capacity`
+ * @param largest  per group, the most neighbours that a particle has
+ */
+KERNEL void findNeighbours(int n, int capacity, int4 cells, GLOBAL const fraction4* RESTRICT places,
+        GLOBAL const int* RESTRICT cellStart, GLOBAL const real* RESTRICT geometry,
+        GLOBAL int* RESTRICT neighbours, GLOBAL int* RESTRICT counts, GLOBAL real* RESTRICT largest) {
+    LOCAL real buffer[GROUP_SIZE];
+    real most = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        const fraction4 own = places[i];
+        const real x = fromFraction(own.x), y = fromFraction(own.y), z = fromFraction(own.z);
+        const int2 alongX = cellInterval(x-geometry[REACH], x+geometry[REACH], cells.x);
+        const int2 alongY = cellInterval(y-geometry[REACH+1], y+geometry[REACH+1], cells.y);
+        const int2 alongZ = cellInterval(z-geometry[REACH+2], z+geometry[REACH+2], cells.z);
+        int found = 0;
+        for (int column = 0; column < 2*alongX.y*alongY.y; column++) {
+            const int cx = wrapped(alongX.x+column/(2*alongY.y), cells.x);
+            const int cy = wrapped(alongY.x+column/2%alongY.y, cells.y);
+            const int2 run = runOfPlaces(cellStart+(cx*cells.y+cy)*cells.z, alongZ, cells.z, column%2);
+            for (int j = run.x; j < run.y; j++)
+                if (lengthSquared(displacement(own, places[j], geometry)) < geometry[RANGE2] && j != i) {
+                    if (found < capacity)
+                        neighbours[found*(mm_long) n+i] = j;
+                    found++;
+                }
+        }
+        counts[i] = found < capacity ? found : capacity;
+        most = larger(most, (real) found);
+    }
+    most = largestInGroup(buffer, most);
+    if (LOCAL_ID == 0)
+        largest[MOST_NEIGHBOURS*NUM_GROUPS+GROUP_ID] = most;
+}
+#endif
+
+DEVICE real polynomial(GLOBAL const real* RESTRICT coefficients, int degree, real t) {
+    real sum = coefficients[0];
+    for (int power = 1; power <= degree; power++)
+        sum = sum*t+coefficients[power];
+    return sum;
+}
+
+/**
+ * F and C of a pair.
+ * @param tables  polynomials of the wave part, F's [DEGREE_F+1] and C's [DEGREE_C+1], highest power
+ * first
+ */
+DEVICE real2 pairScalars(real r2, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables) {
+    const real t = geometry[SCALE]*r2-1;
+    const real waveF = polynomial(tables, DEGREE_F, t), waveC = polynomial(tables+DEGREE_F+1, DEGREE_C, t);
+    // C counts for nothing where 1/r^2 could overflow
+    if (r2 < (real) SMALLEST_R2)
+        return make_real2(1-waveF, 0);
+    const real r = SQRT(r2), s = 1/r;
+    real F, G;
+    if (r < (real) CONTACT) {
+        F = 1+(real) OVERLAP_F1*r;
+        G = 1+(real) OVERLAP_G1*r;
+    }
+    else {
+        F = s*((real) APART_F1+(real) APART_F3*s*s);
+        G = s*((real) APART_G1+(real) APART_G3*s*s);
+    }
+    return make_real2(F-waveF, (G-F)*s*s-waveC);
+}
+
+/** Row i of M_R times v. */
+DEVICE real4 rowProduct(int i, int n, GLOBAL const fraction4* RESTRICT places,
+#ifdef SUM_IMAGES
+        GLOBAL const real4* RESTRICT images, GLOBAL const int2* RESTRICT neighbours,
+#else
+        GLOBAL const int* RESTRICT neighbours,
+#endif
+        GLOBAL const int* RESTRICT counts, GLOBAL const real* RESTRICT geometry,
+        GLOBAL const real* RESTRICT tables, GLOBAL const real4* RESTRICT v) {
+    const fraction4 own = places[i];
+    const real4 mine = v[i];
+    real x = geometry[SELF]*mine.x, y = geometry[SELF]*mine.y, z = geometry[SELF]*mine.z;
+    const int count = counts[i];
+    for (int k = 0; k < count; k++) {
+#ifdef SUM_IMAGES
+        const int2 entry = neighbours[k*(mm_long) n+i];
+        const int j = entry.x;
+        const real4 image = images[entry.y];
+        real4 d = displacement(own, places[j], geometry);
+        d.x += image.x;
+        d.y += image.y;
+        d.z += image.z;
+#else
+        const int j = neighbours[k*(mm_long) n+i];
+        const real4 d = displacement(own, places[j], geometry);
+#endif
+        const real4 w = v[j];
+        const real2 pair = pairScalars(lengthSquared(d), geometry, tables);
+        const real along = pair.y*(d.x*w.x+d.y*w.y+d.z*w.z);
+        x += pair.x*w.x+along*d.x;
+        y += pair.x*w.y+along*d.y;
+        z += pair.x*w.z+along*d.z;
+    }
+    return make_real4(x, y, z, 0);
+}
+
+#ifdef SUM_IMAGES
+#define MATRIX_PARAMETERS int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const real4* RESTRICT images, \
+        GLOBAL const int2* RESTRICT neighbours, GLOBAL const int* RESTRICT counts, \
+        GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables
+#define ROW_PRODUCT(i, v) rowProduct(i, n, places, images, neighbours, counts, geometry, tables, v)
+#else
+#define MATRIX_PARAMETERS int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT neighbours, \
+        GLOBAL const int* RESTRICT counts, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables
+#define ROW_PRODUCT(i, v) rowProduct(i, n, places, neighbours, counts, geometry, tables, v)
+#endif
+
+/** u = M_R f */
+KERNEL void multiplyReal(MATRIX_PARAMETERS, GLOBAL const real4* RESTRICT f, GLOBAL real4* RESTRICT u) {
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE)
+        u[i] = ROW_PRODUCT(i, f);
+}
+
+// The Lanczos process leaves its basis vectors v_i unnormalised, basis[i][n]; `partial` holds one
+// row of sums over groups for each |v_i|^2 (row 2i) and each v_i . M v_i (row 2i+1).
+
+/** Basis vector 0: normal numbers of the particles. */
+KERNEL void drawNoise(int n, int4 key, GLOBAL const fraction4* RESTRICT places, GLOBAL real4* RESTRICT basis,
+        GLOBAL mixed* RESTRICT partial) {
+    LOCAL mixed buffer[GROUP_SIZE];
+    mixed square = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        real z[3];
+        particleNoise(key.x, key.y, key.z, key.w, (unsigned int) places[i].w, z);
+        const real4 own = make_real4(z[0], z[1], z[2], 0);
+        basis[i] = own;
+        square += dotProduct(own, own);
+    }
+    square = sumInGroup(buffer, square);
+    if (LOCAL_ID == 0)
+        partial[GROUP_ID] = square;
+}
+
+/** v_{i+1} = M v_i/|v_i| - v_{i-1} |v_i|/|v_{i-1}|, and v_i . v_{i+1} */
+KERNEL void expandBasis(MATRIX_PARAMETERS, int iteration, GLOBAL real4* RESTRICT basis, GLOBAL mixed* RESTRICT partial) {
+    LOCAL mixed buffer[GROUP_SIZE];
+    const int groups = NUM_GROUPS;
+    const mixed square = sumOfGroups(buffer, partial+2*iteration*groups, groups);
+    const mixed before = iteration > 0 ? sumOfGroups(buffer, partial+2*(iteration-1)*groups, groups) : 0;
+    // an exhausted space goes on with zeros
+    const real s = square > 0 ? (real) (1/sqrt(square)) : 0, t = before > 0 ? (real) sqrt(square/before) : 0;
+    GLOBAL const real4* current = basis+iteration*(mm_long) n;
+    mixed overlap = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        real4 next = ROW_PRODUCT(i, current);
+        const real4 last = iteration > 0 ? basis[(iteration-1)*(mm_long) n+i] : make_real4(0, 0, 0, 0);
+        next.x = s*next.x-t*last.x;
+        next.y = s*next.y-t*last.y;
+        next.z = s*next.z-t*last.z;
+        basis[(iteration+1)*(mm_long) n+i] = next;
+        overlap += dotProduct(current[i], next);
+    }
+    overlap = sumInGroup(buffer, overlap);
+    if (LOCAL_ID == 0)
+        partial[(2*iteration+1)*groups+GROUP_ID] = overlap;
+}
+
+/** v_{i+1} -= v_i (v_i . v_{i+1})/|v_i|^2, and |v_{i+1}|^2 */
+KERNEL void makeOrthogonal(int n, int iteration, GLOBAL real4* RESTRICT basis, GLOBAL mixed* RESTRICT partial) {
+    LOCAL mixed buffer[GROUP_SIZE];
+    const int groups = NUM_GROUPS;
+    const mixed square = sumOfGroups(buffer, partial+2*iteration*groups, groups);
+    const mixed overlap = sumOfGroups(buffer, partial+(2*iteration+1)*groups, groups);
+    const real c = square > 0 ? (real) (overlap/square) : 0;
+    mixed newSquare = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        const real4 last = basis[iteration*(mm_long) n+i];
+        real4 next = basis[(iteration+1)*(mm_long) n+i];
+        next.x -= c*last.x;
+        next.y -= c*last.y;
+        next.z -= c*last.z;
+        basis[(iteration+1)*(mm_long) n+i] = next;
+        newSquare += dotProduct(next, next);
+    }
+    newSquare = sumInGroup(buffer, newSquare);
+    if (LOCAL_ID == 0)
+        partial[2*(iteration+1)*groups+GROUP_ID] = newSquare;
+}
+
+/** u += sum over k of coefficients[k] v_k */
+KERNEL void combineBasis(int n, int count, GLOBAL const real4* RESTRICT basis,
+        GLOBAL const real* RESTRICT coefficients, GLOBAL real4* RESTRICT u) {
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        real4 sum = u[i];
+        for (int k = 0; k < count; k++) {
+            const real4 v = basis[k*(mm_long) n+i];
+            sum.x += coefficients[k]*v.x;
+            sum.y += coefficients[k]*v.y;
+            sum.z += coefficients[k]*v.z;
+        }
+        u[i] = sum;
+    }
+}

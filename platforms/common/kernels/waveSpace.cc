@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+// The wave-space half: spread, scale between two transforms, gather [T4, T9, T10]. SUPPORT is P, the
+// points of the window along an axis. Grids are [x][y][z], one for each component.
+
+#define POINTS (3*SUPPORT)
+
+/**
+ * Where the windows of particles begin and what they weigh, one thread for each weight.
+ * @param coefficients  [WINDOW_DEGREE+1][SUPPORT], highest power first, in t of Window::polynomials
+ * @param starts        first grid point along each axis, in [0, size)
+ * @param weights       [n][3][SUPPORT]
+ */
+KERNEL void evaluateWindows(int n, int4 size, GLOBAL const fraction4* RESTRICT places,
+        GLOBAL const real* RESTRICT coefficients, GLOBAL int4* RESTRICT starts, GLOBAL real* RESTRICT weights) {
+    for (int i = GLOBAL_ID; i < n*POINTS; i += GLOBAL_SIZE) {
+        const int place = i/POINTS, axis = i%POINTS/SUPPORT, point = i%SUPPORT;
+        const fraction4 s = places[place];
+        const fraction own = (axis == 0 ? s.x : (axis == 1 ? s.y : s.z));
+        const int count = (axis == 0 ? size.x : (axis == 1 ? size.y : size.z));
+        // u - P/2 in units of 2^-GRID_BITS grid spacings, up to whole ones, and its ceiling
+        const mm_long unit = (mm_long) 1 << GRID_BITS;
+        const mm_long u = (mm_long) ((mm_ulong) (own >> (FRACTION_BITS-GRID_BITS))*(unsigned int) count)-SUPPORT%2*(unit/2);
+        const mm_long up = (u+unit-1) >> GRID_BITS;
+        const real t = (real) 2*((real) (up*unit-u)/(real) unit)-1;
+        int start = (int) up-SUPPORT/2;
+        if (start < 0)
+            start += count;
+        real weight = coefficients[point];
+        for (int power = 1; power <= WINDOW_DEGREE; power++)
+            weight = weight*t+coefficients[power*SUPPORT+point];
+        weights[i] = weight;
+        if (point == 0) {
+            if (axis == 0)
+                starts[place].x = start;
+            else if (axis == 1)
+                starts[place].y = start;
+            else
+                starts[place].z = start;
+        }
+    }
+}
+
+// A work group of GROUP_SIZE threads owns a block of grid points. A thread owns a part of a column
+// along z, for which it collects the forces of all particles nearby: nothing is shared, nothing
+// needs to be zero before, and sums have one order.
+#define BLOCK_X 8
+#define BLOCK_Y 8
+#define BLOCK_Z 32
+#define PART 8 // points of a thread
+#define PARTS (BLOCK_Z/PART)
+#define COLUMNS (BLOCK_X*BLOCK_Y)
+#define BATCH 64 // particles in local memory at once
+#define STAGED (BLOCK_X+BLOCK_Y+BLOCK_Z)
+#define LOCAL_REALS (BATCH*(STAGED+3)) // at least COLUMNS*BLOCK_Z, for what is written in the end
+
+/** The weight of a window that begins at `start` on a grid point, zero beyond its support. */
+DEVICE real weightAt(int point, int start, int count, GLOBAL const real* RESTRICT weights) {
+    int j = point-start;
+    if (j < 0)
+        j += count;
+    return j < SUPPORT ? weights[j] : 0;
+}
+
+/** Cells that hold the particles whose windows touch grid points [from, from+BLOCK) of an axis. */
+DEVICE int2 cellsOfBlock(int from, int block, int count, int cells) {
+    const int to = (from+block < count ? from+block : count)-1;
+    const real margin = (real) 1e-5, reach = (real) 0.5*SUPPORT;
+    return cellInterval((from-reach)/count-margin, (to+reach)/count+margin, cells);
+}
+
+/** Bit p is set if a window that begins at `start` touches part p of a block along z. */
+DEVICE int touchedParts(int start, int corner, int count) {
+    int parts = 0;
+    for (int part = 0; part < PARTS; part++) {
+        int ahead = corner+part*PART-start;
+        if (ahead < 0)
+            ahead += count;
+        if (ahead < SUPPORT || count-ahead < PART)
+            parts |= 1 << part;
+    }
+    return parts;
+}
+
+/** Weights of a batch of particles on the points of a block, the parts they touch, their forces. */
+DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL const int4* RESTRICT starts,
+        GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f, LOCAL_ARG real* staged,
+        LOCAL_ARG int* touched) {
+    for (int i = LOCAL_ID; i < count*STAGED; i += GROUP_SIZE) {
+        const int particle = i/STAGED, point = i%STAGED;
+        const int4 start = starts[first+particle];
+        GLOBAL const real* RESTRICT own = weights+(first+particle)*(mm_long) POINTS;
+        if (point < BLOCK_X)
+            staged[i] = weightAt(corner.x+point, start.x, size.x, own);
+        else if (point < BLOCK_X+BLOCK_Y)
+            staged[i] = weightAt(corner.y+point-BLOCK_X, start.y, size.y, own+SUPPORT);
+        else
+            staged[i] = weightAt(corner.z+point-BLOCK_X-BLOCK_Y, start.z, size.z, own+2*SUPPORT);
+    }
+    for (int i = LOCAL_ID; i < count; i += GROUP_SIZE) {
+        const real4 force = f[first+i];
+        touched[i] = touchedParts(starts[first+i].z, corner.z, size.z);
+        staged[BATCH*STAGED+3*i] = force.x;
+        staged[BATCH*STAGED+3*i+1] = force.y;
+        staged[BATCH*STAGED+3*i+2] = force.z;
+    }
+}
+
+/** Write one component of a block, neighbouring threads to neighbouring points. */
+DEVICE void storeBlock(const real* sums, int4 corner, int4 size, LOCAL_ARG real* buffer, GLOBAL real* RESTRICT grid) {
+    const int column = LOCAL_ID/PARTS, part = LOCAL_ID%PARTS;
+    SYNC_THREADS;
+    for (int k = 0; k < PART; k++)
+        buffer[column*BLOCK_Z+part*PART+k] = sums[k];
+    SYNC_THREADS;
+    for (int i = LOCAL_ID; i < COLUMNS*BLOCK_Z; i += GROUP_SIZE) {
+        const int x = corner.x+i/(BLOCK_Y*BLOCK_Z), y = corner.y+i/BLOCK_Z%BLOCK_Y, z = corner.z+i%BLOCK_Z;
+        if (x < size.x && y < size.y && z < size.z)
+            grid[(x*size.y+y)*size.z+z] = buffer[i];
+    }
+}
+
+/** Forces on the grid. */
+KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT cellStart,
+        GLOBAL const int4* RESTRICT starts, GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f,
+        GLOBAL real* RESTRICT gridX, GLOBAL real* RESTRICT gridY, GLOBAL real* RESTRICT gridZ) {
+    LOCAL real staged[LOCAL_REALS];
+    LOCAL int touched[BATCH];
+    const int blocksY = (size.y+BLOCK_Y-1)/BLOCK_Y, blocksZ = (size.z+BLOCK_Z-1)/BLOCK_Z;
+    const int blocks = (size.x+BLOCK_X-1)/BLOCK_X*blocksY*blocksZ;
+    const int column = LOCAL_ID/PARTS, part = LOCAL_ID%PARTS;
+    for (int block = GROUP_ID; block < blocks; block += NUM_GROUPS) {
+        const int4 corner = make_int4(block/(blocksY*blocksZ)*BLOCK_X, block/blocksZ%blocksY*BLOCK_Y,
+                block%blocksZ*BLOCK_Z, 0);
+        const int2 alongX = cellsOfBlock(corner.x, BLOCK_X, size.x, cells.x);
+        const int2 alongY = cellsOfBlock(corner.y, BLOCK_Y, size.y, cells.y);
+        const int2 alongZ = cellsOfBlock(corner.z, BLOCK_Z, size.z, cells.z);
+        real sumX[PART], sumY[PART], sumZ[PART];
+        for (int k = 0; k < PART; k++)
+            sumX[k] = sumY[k] = sumZ[k] = 0;
+        for (int c = 0; c < 2*alongX.y*alongY.y; c++) {
+            const int cx = wrapped(alongX.x+c/(2*alongY.y), cells.x), cy = wrapped(alongY.x+c/2%alongY.y, cells.y);
+            const int2 run = runOfPlaces(cellStart+(cx*cells.y+cy)*cells.z, alongZ, cells.z, c%2);
+            for (int first = run.x; first < run.y; first += BATCH) {
+                const int count = run.y-first < BATCH ? run.y-first : BATCH;
+                SYNC_THREADS;
+                stageParticles(first, count, corner, size, starts, weights, f, staged, touched);
+                SYNC_THREADS;
+                for (int i = 0; i < count; i++) {
+                    LOCAL_ARG const real* own = staged+i*STAGED;
+                    const real w = own[column/BLOCK_Y]*own[BLOCK_X+column%BLOCK_Y];
+                    if (w == 0 || (touched[i] >> part & 1) == 0)
+                        continue;
+                    LOCAL_ARG const real* alongPart = own+BLOCK_X+BLOCK_Y+part*PART;
+                    LOCAL_ARG const real* force = staged+BATCH*STAGED+3*i;
+                    const real fx = w*force[0], fy = w*force[1], fz = w*force[2];
+                    for (int k = 0; k < PART; k++) {
+                        sumX[k] += fx*alongPart[k];
+                        sumY[k] += fy*alongPart[k];
+                        sumZ[k] += fz*alongPart[k];
+                    }
+                }
+            }
+        }
+        storeBlock(sumX, corner, size, staged, gridX);
+        storeBlock(sumY, corner, size, staged, gridY);
+        storeBlock(sumZ, corner, size, staged, gridZ);
+        SYNC_THREADS;
+    }
+}
+
+/** Signed wave number of an index along an axis. */
+DEVICE int waveNumber(int i, int count) {
+    return 2*i <= count ? i : i-count;
+}
+
+/**
+ * Gridded forces to gridded velocities, in place, thermal part included [T6, T9]:
+ *
+ *     u(k) = forced D Q f(k) + noise sqrt(D) Q z(k),   Q = I - k k^T/k^2
+ *
+ * @param waves    k = waves n, row by row
+ * @param factors  D >= 0, zero where a mode is not kept
+ */
+KERNEL void scaleWaves(int4 size, int forced, real noise, int4 key, GLOBAL const real* RESTRICT waves,
+        GLOBAL const real* RESTRICT factors, GLOBAL real2* RESTRICT gridX, GLOBAL real2* RESTRICT gridY,
+        GLOBAL real2* RESTRICT gridZ) {
+    const int sizeZ = size.z/2+1, modes = size.x*size.y*sizeZ;
+    for (int i = GLOBAL_ID; i < modes; i += GLOBAL_SIZE) {
+        const real D = factors[i];
+        real2 x = make_real2(0, 0), y = make_real2(0, 0), z = make_real2(0, 0);
+        if (D > 0) {
+            const int nx = waveNumber(i/(size.y*sizeZ), size.x), ny = waveNumber(i/sizeZ%size.y, size.y), nz = i%sizeZ;
+            if (forced) {
+                const real2 fx = gridX[i], fy = gridY[i], fz = gridZ[i];
+                x = make_real2(D*fx.x, D*fx.y);
+                y = make_real2(D*fy.x, D*fy.y);
+                z = make_real2(D*fz.x, D*fz.y);
+            }
+            if (noise != 0) {
+                const real amplitude = noise*SQRT(D);
+                real re[3], im[3];
+                modeNoise(key.x, key.y, key.z, key.w, nx, ny, nz, re, im);
+                x.x += amplitude*re[0];
+                x.y += amplitude*im[0];
+                y.x += amplitude*re[1];
+                y.y += amplitude*im[1];
+                z.x += amplitude*re[2];
+                z.y += amplitude*im[2];
+            }
+            const real kx = waves[0]*nx+waves[1]*ny+waves[2]*nz, ky = waves[3]*nx+waves[4]*ny+waves[5]*nz,
+                    kz = waves[6]*nx+waves[7]*ny+waves[8]*nz;
+            const real scale = 1/(kx*kx+ky*ky+kz*kz);
+            const real alongRe = scale*(kx*x.x+ky*y.x+kz*z.x), alongIm = scale*(kx*x.y+ky*y.y+kz*z.y);
+            x = make_real2(x.x-alongRe*kx, x.y-alongIm*kx);
+            y = make_real2(y.x-alongRe*ky, y.y-alongIm*ky);
+            z = make_real2(z.x-alongRe*kz, z.y-alongIm*kz);
+        }
+        gridX[i] = x;
+        gridY[i] = y;
+        gridZ[i] = z;
+    }
+}
+
+/** u += what the grids hold at the particles; LANES >= SUPPORT threads for each, along z. */
+KERNEL void gatherVelocities(int n, int4 size, GLOBAL const int4* RESTRICT starts,
+        GLOBAL const real* RESTRICT weights, GLOBAL const real* RESTRICT gridX, GLOBAL const real* RESTRICT gridY,
+        GLOBAL const real* RESTRICT gridZ, GLOBAL real4* RESTRICT u) {
+    LOCAL real sums[3*GROUP_SIZE];
+    const int lane = LOCAL_ID%LANES, perGroup = GROUP_SIZE/LANES;
+    for (int first = GROUP_ID*perGroup; first < n; first += NUM_GROUPS*perGroup) {
+        const int place = first+LOCAL_ID/LANES;
+        real x = 0, y = 0, z = 0;
+        if (place < n && lane < SUPPORT) {
+            const int4 start = starts[place];
+            GLOBAL const real* RESTRICT own = weights+place*(mm_long) POINTS;
+            const int pointZ = wrapped(start.z+lane, size.z);
+            for (int dx = 0; dx < SUPPORT; dx++) {
+                const int plane = wrapped(start.x+dx, size.x)*size.y;
+                real planeX = 0, planeY = 0, planeZ = 0;
+                for (int dy = 0; dy < SUPPORT; dy++) {
+                    const int point = (plane+wrapped(start.y+dy, size.y))*size.z+pointZ;
+                    const real w = own[SUPPORT+dy];
+                    planeX += w*gridX[point];
+                    planeY += w*gridY[point];
+                    planeZ += w*gridZ[point];
+                }
+                x += own[dx]*planeX;
+                y += own[dx]*planeY;
+                z += own[dx]*planeZ;
+            }
+            x *= own[2*SUPPORT+lane];
+            y *= own[2*SUPPORT+lane];
+            z *= own[2*SUPPORT+lane];
+        }
+        SYNC_THREADS;
+        sums[3*LOCAL_ID] = x;
+        sums[3*LOCAL_ID+1] = y;
+        sums[3*LOCAL_ID+2] = z;
+        SYNC_THREADS;
+        if (place < n && lane == 0) {
+            real4 total = u[place];
+            for (int k = 3*LOCAL_ID; k < 3*LOCAL_ID+3*LANES; k += 3) {
+                total.x += sums[k];
+                total.y += sums[k+1];
+                total.z += sums[k+2];
+            }
+            u[place] = total;
+        }
+    }
+}
