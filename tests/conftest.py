@@ -18,3 +18,8 @@ def pytest_generate_tests(metafunc):
         metafunc.parametrize(
             "platformName", metafunc.config.getoption("platform") or PLATFORMS, scope="session"
         )
+
+
+def pytest_collection_modifyitems(items):
+    """What compiles recorded programs comes after all that records some."""
+    items.sort(key=lambda item: item.path.name == "test_cuda_kernels.py")

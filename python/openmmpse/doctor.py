@@ -58,15 +58,36 @@ def simdInstructions():
     return " ".join(name for name in known if name in words) or "none"
 
 
+def loadFailures():
+    """{library: why OpenMM could not load it}."""
+    parts = [
+        failure.removeprefix("Error loading library ").partition(": ")
+        for failure in openmm.Platform.getPluginLoadFailures()
+    ]
+    return {Path(library).name: reason for library, _, reason in parts}
+
+
+def whyNoDevice(name):
+    """Why this machine cannot run a platform that needs a device; nothing if it should."""
+    platform = plugins.loadedPlatforms().get(name)
+    if platform is None:
+        reason = loadFailures().get(f"libOpenMM{name}.so")
+        return f"OpenMM has no platform {name} here" + (f" ({reason})" if reason else "")
+    if name == "CUDA" and not (plugins.DIRECTORY / plugins.LIBRARIES[name]).exists():
+        return "its plugin is another package: pip install 'openmm-pse[cuda13]'"
+    return None if platform.getDevices() else "no device found"
+
+
 def printLoadFailures():
-    """Print why plugins were not loaded: ours each, OpenMM's own in one line."""
+    """Print why plugins were not loaded: ours each, OpenMM's own in one line. Where there is no
+    device, nothing needs its plugins."""
+    unneeded = [plugins.LIBRARIES[name] for name in plugins.DEVICES if whyNoDevice(name)]
     others = []
-    for failure in openmm.Platform.getPluginLoadFailures():
-        library, _, reason = failure.removeprefix("Error loading library ").partition(": ")
-        if Path(library).name.startswith("libOpenMMPSE"):
-            print(f"           NOT LOADED: {Path(library).name} ({reason})")
-        else:
-            others.append(f"{Path(library).name} ({reason})")
+    for library, reason in loadFailures().items():
+        if not library.startswith("libOpenMMPSE"):
+            others.append(f"{library} ({reason})")
+        elif library not in unneeded:
+            print(f"           NOT LOADED: {library} ({reason})")
     if others:
         more = f" and {len(others) - 1} more" if len(others) > 1 else ""
         print(f"           without OpenMM's own {others[0]}{more}, which openmmpse does not need")
@@ -98,6 +119,9 @@ def printInstallation():
 
 def checkPlatform(name):
     """Run the check on one platform, print the outcome and return whether it is right."""
+    if name in plugins.DEVICES and (reason := whyNoDevice(name)):
+        print(f"{name:10} not used: {reason}")
+        return True
     if name not in plugins.platforms():
         print(
             f"{name:10} FAILED: the platform or its plugin {plugins.LIBRARIES[name]} is not loaded"
@@ -117,7 +141,7 @@ def checkPlatform(name):
 
 
 def main(argv=None):
-    """Print the report; return 0 if every platform of this package works, else 1."""
+    """Print the report; return 0 if every platform that this machine has works, else 1."""
     parser = argparse.ArgumentParser(prog="python -m openmmpse doctor", description=__doc__)
     parser.parse_args(argv)
     printInstallation()
