@@ -95,7 +95,7 @@ spec = u.find_spec('nvidia')
 print(';'.join(f'{p}/cu13' for p in spec.submodule_search_locations) if spec else '')"
         OUTPUT_VARIABLE wheels OUTPUT_STRIP_TRAILING_WHITESPACE)
     find_path(PSE_CUDA_INCLUDE_DIR cuda.h PATH_SUFFIXES include
-        HINTS ENV CUDA_PATH ENV CUDA_HOME PATHS /usr/local/cuda ${wheels})
+        HINTS ENV CUDA_PATH ENV CUDA_HOME ${wheels} PATHS /usr/local/cuda)
     if(NOT PSE_CUDA_INCLUDE_DIR)
         message(FATAL_ERROR "The header cuda.h was not found; install a CUDA toolkit (and set "
             "CUDA_PATH if it is not in /usr/local/cuda), or: "

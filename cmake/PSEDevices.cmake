@@ -17,11 +17,7 @@ endfunction()
 
 pse_static_library(psecommon platforms/common)
 target_include_directories(psecommon PUBLIC platforms/common)
-if(TARGET psebase)
-    target_link_libraries(psecommon PUBLIC psebase)
-else()
-    target_link_libraries(psecommon PUBLIC psehost)
-endif()
+target_link_libraries(psecommon PUBLIC psebase)
 file(GLOB kernels CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/platforms/common/kernels/*.cc)
 pse_embed_kernels(psecommon ${CMAKE_CURRENT_SOURCE_DIR}/numerics/NoiseText.h ${kernels})
 

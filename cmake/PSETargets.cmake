@@ -73,7 +73,9 @@ function(pse_plugin target folder)
     # The API library comes along even if no kernel calls it: it registers the XML proxy.
     target_link_options(${target} PRIVATE -Wl,--version-script=${exports} -Wl,--no-as-needed)
     target_link_libraries(${target} PRIVATE ${ARGN})
-    install(TARGETS ${target} LIBRARY DESTINATION ${PSE_LIBRARY_DIR}/plugins)
+    # a component each: the plugin for CUDA is a wheel of its own
+    install(TARGETS ${target}
+        LIBRARY DESTINATION ${PSE_LIBRARY_DIR}/plugins COMPONENT ${target})
 endfunction()
 
 # pse_python_module(<name> <interface>): the SWIG module openmmpse.<name>
