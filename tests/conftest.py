@@ -23,3 +23,12 @@ def pytest_generate_tests(metafunc):
 def pytest_collection_modifyitems(items):
     """What compiles recorded programs comes after all that records some."""
     items.sort(key=lambda item: item.path.name == "test_cuda_kernels.py")
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Tables that tests recorded as a property are printed, whatever the outcome."""
+    for outcome in ("passed", "failed"):
+        for report in terminalreporter.getreports(outcome):
+            for title, table in report.user_properties:
+                terminalreporter.section(title)
+                terminalreporter.write_line(table)

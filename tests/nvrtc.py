@@ -24,6 +24,7 @@ import openmm.version
 
 ARCHITECTURES = (75, 80, 90, 120)
 PRECISIONS = ("single", "mixed", "double")
+TITLE = "CUDA: registers/static shared/stack/spilled bytes, the most of any variant"
 OPTIONS = ("--use_fast_math",)  # OpenMM's own
 DOUBLE4 = "--diag-suppress=1444"  # CUDA 13 deprecates double4, which OpenMM's text uses
 
@@ -238,7 +239,7 @@ class Report:
         ]
 
     def table(self):
-        """Registers / static shared bytes / stack bytes / spilled bytes: the most of any variant."""
+        """What TITLE says, for each kernel and architecture."""
         width = max((len(" ".join(key)) for key in self.usage), default=0)
         heads = "".join(f"{f'{a / 10}':>20}" for a in ARCHITECTURES)
         lines = [f"{'program kernel precision':{width}} variants{heads}"]
@@ -277,7 +278,7 @@ def compilePrograms(programs, architectures=ARCHITECTURES):
 def main(folder):
     """Print the table of a folder's programs; return 0 if all compile and none spills, else 1."""
     report = compilePrograms(readPrograms(folder))
-    print(report.table())
+    print(f"{TITLE}\n{report.table()}")
     print("\n".join(report.errors + report.spills()))
     return 1 if report.errors or report.spills() or not report.usage else 0
 

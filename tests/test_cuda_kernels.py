@@ -112,7 +112,7 @@ def runOnOpenCL(scene, precision, tolerance, configure):
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """Every program that was compiled on OpenCL so far, in the folder that the run asked for."""
+    """Every program that was compiled on OpenCL so far."""
     if "OpenCL" not in plugins.platforms():
         pytest.skip("no OpenCL device here on which to record programs (Debian: pocl-opencl-icd)")
     folder = os.environ.get("OPENMMPSE_KERNEL_DUMP")
@@ -163,8 +163,7 @@ def testErrorsAndSpillsAreNoticed():
 
 def testShippedKernelsCompileForCudaAndDoNotSpill(recorded, record_property):
     report = compiled(recorded)
-    record_property("table", report.table())
-    print(report.table())
+    record_property(nvrtc.TITLE, report.table())
     assert report.errors == []
     assert report.spills() == []
     sources = "\n".join(path.read_text(encoding="ascii") for path in KERNELS.glob("*.cc"))
