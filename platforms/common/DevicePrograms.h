@@ -3,6 +3,7 @@
 #define OPENMMPSE_DEVICEPROGRAMS_H_
 
 #include "KernelPrograms.h"
+#include "openmm/common/ComputeArray.h"
 
 namespace PSE {
 
@@ -10,10 +11,15 @@ using Defines = std::map<std::string, std::string>;
 
 /** kernels/particles.cc, with what it builds upon. */
 OpenMM::ComputeProgram particleProgram(OpenMM::ComputeContext& context);
-/** kernels/realSpace.cc; `defines` are those of the Plan. */
-OpenMM::ComputeProgram realSpaceProgram(OpenMM::ComputeContext& context, Defines defines);
-/** kernels/waveSpace.cc; `defines` are those of the Plan. */
-OpenMM::ComputeProgram waveSpaceProgram(OpenMM::ComputeContext& context, Defines defines);
+/** kernels/realSpace.cc */
+OpenMM::ComputeProgram realSpaceProgram(OpenMM::ComputeContext& context, const Defines& defines,
+                                        const PlanConstants& constants);
+/** kernels/waveSpace.cc */
+OpenMM::ComputeProgram waveSpaceProgram(OpenMM::ComputeContext& context,
+                                        const PlanConstants& constants);
+/** The constants as kernels take them. */
+void uploadConstants(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,
+                     const PlanConstants& constants);
 
 } // namespace PSE
 

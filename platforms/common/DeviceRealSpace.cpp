@@ -21,16 +21,9 @@ constexpr int FIRST_ITERATIONS = 5; ///< of a first step
 constexpr double SMALLEST_R2 = 1e-30;
 /// of the range, in units of the box: what rounding of fractions may do, and more
 constexpr double REACH_MARGIN = 1e-6;
-/// Degrees are rounded up to multiples of this, so that few programs serve many Plans.
-constexpr int DEGREE_UNIT = 4;
 
-int roundedDegree(const Polynomial& p) {
-    return (p.degree() + DEGREE_UNIT - 1) / DEGREE_UNIT * DEGREE_UNIT;
-}
-
-/** Append coefficients, highest power first, for a degree that may be higher than p's. */
-void appendCoefficients(const Polynomial& p, int degree, std::vector<double>& all) {
-    all.insert(all.end(), degree - p.degree(), 0.0);
+/** Append the powers of a polynomial, highest first. */
+void appendCoefficients(const Polynomial& p, std::vector<double>& all) {
     all.insert(all.end(), p.powers.rbegin(), p.powers.rend());
 }
 
@@ -55,18 +48,18 @@ DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, cons
     const double mean = meanNeighbours(box, n, plan.realCutoff);
     capacity = static_cast<int>(std::min(ROOM * mean + LEAST_ROOM, 1e9));
     const RealTable table = makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError);
-    const int degreeF = roundedDegree(table.F), degreeC = roundedDegree(table.C);
     std::vector<double> values;
-    appendCoefficients(table.F, degreeF, values);
-    appendCoefficients(table.C, degreeC, values);
+    appendCoefficients(table.F, values);
+    appendCoefficients(table.C, values);
     uploadReals(tables, context, values, "pseTables");
     prepareGeometry(plan, box);
     counts.initialize<int>(context, n, "pseCounts");
 
     using c = RpyCoefficients;
-    Defines defines = {{"DEGREE_F", std::to_string(degreeF)},
-                       {"DEGREE_C", std::to_string(degreeC)},
-                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
+    const PlanConstants constants = {{"DEGREE_F", table.F.degree()},
+                                     {"DEGREE_C", table.C.degree()}};
+    uploadConstants(planConstants, context, constants);
+    Defines defines = {{"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
                        {"CONTACT", context.doubleToString(c::CONTACT)},
                        {"APART_F1", context.doubleToString(c::APART_F1)},
                        {"APART_F3", context.doubleToString(c::APART_F3)},
@@ -79,7 +72,7 @@ DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, cons
         defines["SUM_IMAGES"] = "1";
     else if (v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0)
         defines["TILTED"] = "1";
-    const ComputeProgram program = realSpaceProgram(context, defines);
+    const ComputeProgram program = realSpaceProgram(context, defines, constants);
     findKernel = DeviceKernel(context, program, "findNeighbours");
     multiplyReal = DeviceKernel(context, program, "multiplyReal");
     drawNoise = DeviceKernel(context, program, "drawNoise");
@@ -144,9 +137,11 @@ template <class... Arguments>
 void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments) {
     const int n = places.count();
     if (sumImages)
-        kernel(n, n, places.places(), images, neighbours, counts, geometry, tables, arguments...);
+        kernel(n, n, planConstants, places.places(), images, neighbours, counts, geometry, tables,
+               arguments...);
     else
-        kernel(n, n, places.places(), neighbours, counts, geometry, tables, arguments...);
+        kernel(n, n, planConstants, places.places(), neighbours, counts, geometry, tables,
+               arguments...);
 }
 
 void DeviceRealSpace::multiply(ComputeArray& f, ComputeArray& u) {

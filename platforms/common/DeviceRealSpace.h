@@ -50,7 +50,8 @@ private:
     double lanczosTolerance, negativeTolerance;
     bool sumImages;
     int numImages = 0, capacity;
-    OpenMM::ComputeArray geometry, tables, images, neighbours, counts, basis, coefficients;
+    OpenMM::ComputeArray planConstants, geometry, tables, images, neighbours, counts, basis,
+        coefficients;
     DeviceKernel findKernel, multiplyReal, drawNoise, expandBasis, makeOrthogonal, combineBasis;
     numerics::NoiseKey noise = {};
     int iterations = 0; ///< of the last square root

@@ -48,10 +48,10 @@ DeviceWaveSpace::DeviceWaveSpace(ComputeContext& context, const Plan& plan, cons
     }
     fft = context.createFFT(size.x, size.y, size.z, true);
     prepareFactors(plan, box);
-    const ComputeProgram program =
-        waveSpaceProgram(context, {{"SUPPORT", std::to_string(support)},
-                                   {"WINDOW_DEGREE", std::to_string(degree)},
-                                   {"LANES", std::to_string(lanes)}});
+    const PlanConstants constants = {
+        {"SUPPORT", support}, {"WINDOW_DEGREE", degree}, {"LANES", lanes}};
+    uploadConstants(planConstants, context, constants);
+    const ComputeProgram program = waveSpaceProgram(context, constants);
     windowKernel = DeviceKernel(context, program, "evaluateWindows");
     spreadForces = DeviceKernel(context, program, "spreadForces");
     scaleWaves = DeviceKernel(context, program, "scaleWaves");
@@ -89,15 +89,16 @@ void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
 
 void DeviceWaveSpace::evaluateWindows() {
     const int n = places.count();
-    windowKernel(3 * support * n, n, size, places.places(), coefficients, starts, weights);
+    windowKernel(3 * support * n, n, size, planConstants, places.places(), coefficients, starts,
+                 weights);
 }
 
 void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKey& key,
                                     ComputeArray& u, DeviceClock& clock) {
     const int all = context.getNumThreadBlocks() * GROUP_SIZE;
     if (f != NULL) {
-        spreadForces(all, size, places.cells(), places.cellStarts(), starts, weights, *f, grids[0],
-                     grids[1], grids[2]);
+        spreadForces(all, size, places.cells(), planConstants, places.cellStarts(), starts, weights,
+                     *f, grids[0], grids[1], grids[2]);
         clock.charge("spreading");
         for (int c = 0; c < 3; c++)
             fft->execFFT(grids[c], modes[c], true);
@@ -109,8 +110,8 @@ void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKe
     for (int c = 0; c < 3; c++)
         fft->execFFT(modes[c], grids[c], false);
     clock.charge("Fourier transforms");
-    gatherVelocities(lanes * places.count(), places.count(), size, starts, weights, grids[0],
-                     grids[1], grids[2], u);
+    gatherVelocities(lanes * places.count(), places.count(), size, planConstants, starts, weights,
+                     grids[0], grids[1], grids[2], u);
     clock.charge("gathering");
 }
 

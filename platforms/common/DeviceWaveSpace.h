@@ -40,7 +40,7 @@ private:
     DevicePlaces& places;
     OpenMM::mm_int4 size;
     int support, lanes;
-    OpenMM::ComputeArray coefficients, starts, weights, factors, waves;
+    OpenMM::ComputeArray planConstants, coefficients, starts, weights, factors, waves;
     OpenMM::ComputeArray grids[3], modes[3];
     OpenMM::FFT3D fft;
     DeviceKernel windowKernel, spreadForces, scaleWaves, gatherVelocities;

@@ -65,15 +65,22 @@ void dump(const std::filesystem::path& folder, const ComputeContext& context,
 
 ComputeProgram compileKernels(ComputeContext& context, const std::string& name,
                               const std::string& source,
-                              const std::map<std::string, std::string>& defines) {
+                              const std::map<std::string, std::string>& defines,
+                              const PlanConstants& constants) {
+    std::map<std::string, std::string> compiledIn = defines, used = defines;
+    for (size_t i = 0; i < constants.size(); i++) {
+        const std::string number = std::to_string(constants[i].second);
+        compiledIn[constants[i].first] = number;
+        used[constants[i].first] = context.getIsCPU() ? "plan[" + std::to_string(i) + "]" : number;
+    }
     const char* folder = std::getenv("OPENMMPSE_KERNEL_DUMP");
     if (folder != nullptr && *folder != '\0')
-        dump(folder, context, name, source, defines);
+        dump(folder, context, name, source, compiledIn);
     try {
-        return context.compileProgram(source, defines);
+        return context.compileProgram(source, used);
     } catch (const std::exception& failure) {
         throw OpenMMException("The device program '" + name + "' could not be compiled with\n" +
-                              defineLines(defines) + failure.what());
+                              defineLines(used) + failure.what());
     }
 }
 

@@ -2,6 +2,7 @@
 // The real-space half: M_R = F (I - rr) + G rr as F I + C d d^T, from rows of neighbours, and the
 // Lanczos process for its square root [T7, T18]. Lengths in radii, mobilities in 1/(6 pi eta a).
 // A thread owns a row and adds its neighbours in their order: no sum is shared between threads.
+// DEGREE_F and DEGREE_C are numbers, or entries of `plan` (PlanConstants).
 
 // places in the array of geometry, lengths in radii
 #define BOX 0    // x of a, b; y of b; x, y, z of c, per unit of fractions
@@ -111,7 +112,7 @@ DEVICE real polynomial(GLOBAL const real* RESTRICT coefficients, int degree, rea
  * @param tables  polynomials of the wave part, F's [DEGREE_F+1] and C's [DEGREE_C+1], highest power
  * first
  */
-DEVICE real2 pairScalars(real r2, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables) {
+DEVICE real2 pairScalars(real r2, GLOBAL const int* RESTRICT plan, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables) {
     const real t = geometry[SCALE]*r2-1;
     const real waveF = polynomial(tables, DEGREE_F, t), waveC = polynomial(tables+DEGREE_F+1, DEGREE_C, t);
     // C counts for nothing where 1/r^2 could overflow
@@ -131,7 +132,7 @@ DEVICE real2 pairScalars(real r2, GLOBAL const real* RESTRICT geometry, GLOBAL c
 }
 
 /** Row i of M_R times v. */
-DEVICE real4 rowProduct(int i, int n, GLOBAL const fraction4* RESTRICT places,
+DEVICE real4 rowProduct(int i, int n, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places,
 #ifdef SUM_IMAGES
         GLOBAL const real4* RESTRICT images, GLOBAL const int2* RESTRICT neighbours,
 #else
@@ -157,7 +158,7 @@ DEVICE real4 rowProduct(int i, int n, GLOBAL const fraction4* RESTRICT places,
         const real4 d = displacement(own, places[j], geometry);
 #endif
         const real4 w = v[j];
-        const real2 pair = pairScalars(lengthSquared(d), geometry, tables);
+        const real2 pair = pairScalars(lengthSquared(d), plan, geometry, tables);
         const real along = pair.y*(d.x*w.x+d.y*w.y+d.z*w.z);
         x += pair.x*w.x+along*d.x;
         y += pair.x*w.y+along*d.y;
@@ -167,14 +168,14 @@ DEVICE real4 rowProduct(int i, int n, GLOBAL const fraction4* RESTRICT places,
 }
 
 #ifdef SUM_IMAGES
-#define MATRIX_PARAMETERS int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const real4* RESTRICT images, \
+#define MATRIX_PARAMETERS int n, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places, GLOBAL const real4* RESTRICT images, \
         GLOBAL const int2* RESTRICT neighbours, GLOBAL const int* RESTRICT counts, \
         GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables
-#define ROW_PRODUCT(i, v) rowProduct(i, n, places, images, neighbours, counts, geometry, tables, v)
+#define ROW_PRODUCT(i, v) rowProduct(i, n, plan, places, images, neighbours, counts, geometry, tables, v)
 #else
-#define MATRIX_PARAMETERS int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT neighbours, \
+#define MATRIX_PARAMETERS int n, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT neighbours, \
         GLOBAL const int* RESTRICT counts, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables
-#define ROW_PRODUCT(i, v) rowProduct(i, n, places, neighbours, counts, geometry, tables, v)
+#define ROW_PRODUCT(i, v) rowProduct(i, n, plan, places, neighbours, counts, geometry, tables, v)
 #endif
 
 /** u = M_R f */

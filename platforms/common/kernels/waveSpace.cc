@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The wave-space half: spread, scale between two transforms, gather [T4, T9, T10]. SUPPORT is P, the
-// points of the window along an axis. Grids are [x][y][z], one for each component.
+// points of the window along an axis. Grids are [x][y][z], one for each component. SUPPORT,
+// WINDOW_DEGREE and LANES are numbers, or entries of `plan` (PlanConstants).
 
 #define POINTS (3*SUPPORT)
 
@@ -10,7 +11,7 @@
  * @param starts        first grid point along each axis, in [0, size)
  * @param weights       [n][3][SUPPORT]
  */
-KERNEL void evaluateWindows(int n, int4 size, GLOBAL const fraction4* RESTRICT places,
+KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places,
         GLOBAL const real* RESTRICT coefficients, GLOBAL int4* RESTRICT starts, GLOBAL real* RESTRICT weights) {
     for (int i = GLOBAL_ID; i < n*POINTS; i += GLOBAL_SIZE) {
         const int place = i/POINTS, axis = i%POINTS/SUPPORT, point = i%SUPPORT;
@@ -54,7 +55,8 @@ KERNEL void evaluateWindows(int n, int4 size, GLOBAL const fraction4* RESTRICT p
 #define LOCAL_REALS (BATCH*(STAGED+3)) // at least COLUMNS*BLOCK_Z, for what is written in the end
 
 /** The weight of a window that begins at `start` on a grid point, zero beyond its support. */
-DEVICE real weightAt(int point, int start, int count, GLOBAL const real* RESTRICT weights) {
+DEVICE real weightAt(int point, int start, int count, GLOBAL const int* RESTRICT plan,
+        GLOBAL const real* RESTRICT weights) {
     int j = point-start;
     if (j < 0)
         j += count;
@@ -62,14 +64,14 @@ DEVICE real weightAt(int point, int start, int count, GLOBAL const real* RESTRIC
 }
 
 /** Cells that hold the particles whose windows touch grid points [from, from+BLOCK) of an axis. */
-DEVICE int2 cellsOfBlock(int from, int block, int count, int cells) {
+DEVICE int2 cellsOfBlock(int from, int block, int count, int cells, GLOBAL const int* RESTRICT plan) {
     const int to = (from+block < count ? from+block : count)-1;
     const real margin = (real) 1e-5, reach = (real) 0.5*SUPPORT;
     return cellInterval((from-reach)/count-margin, (to+reach)/count+margin, cells);
 }
 
 /** Bit p is set if a window that begins at `start` touches part p of a block along z. */
-DEVICE int touchedParts(int start, int corner, int count) {
+DEVICE int touchedParts(int start, int corner, int count, GLOBAL const int* RESTRICT plan) {
     int parts = 0;
     for (int part = 0; part < PARTS; part++) {
         int ahead = corner+part*PART-start;
@@ -82,7 +84,8 @@ DEVICE int touchedParts(int start, int corner, int count) {
 }
 
 /** Weights of a batch of particles on the points of a block, the parts they touch, their forces. */
-DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL const int4* RESTRICT starts,
+DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL const int* RESTRICT plan,
+        GLOBAL const int4* RESTRICT starts,
         GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f, LOCAL_ARG real* staged,
         LOCAL_ARG int* touched) {
     for (int i = LOCAL_ID; i < count*STAGED; i += GROUP_SIZE) {
@@ -90,15 +93,15 @@ DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL 
         const int4 start = starts[first+particle];
         GLOBAL const real* RESTRICT own = weights+(first+particle)*(mm_long) POINTS;
         if (point < BLOCK_X)
-            staged[i] = weightAt(corner.x+point, start.x, size.x, own);
+            staged[i] = weightAt(corner.x+point, start.x, size.x, plan, own);
         else if (point < BLOCK_X+BLOCK_Y)
-            staged[i] = weightAt(corner.y+point-BLOCK_X, start.y, size.y, own+SUPPORT);
+            staged[i] = weightAt(corner.y+point-BLOCK_X, start.y, size.y, plan, own+SUPPORT);
         else
-            staged[i] = weightAt(corner.z+point-BLOCK_X-BLOCK_Y, start.z, size.z, own+2*SUPPORT);
+            staged[i] = weightAt(corner.z+point-BLOCK_X-BLOCK_Y, start.z, size.z, plan, own+2*SUPPORT);
     }
     for (int i = LOCAL_ID; i < count; i += GROUP_SIZE) {
         const real4 force = f[first+i];
-        touched[i] = touchedParts(starts[first+i].z, corner.z, size.z);
+        touched[i] = touchedParts(starts[first+i].z, corner.z, size.z, plan);
         staged[BATCH*STAGED+3*i] = force.x;
         staged[BATCH*STAGED+3*i+1] = force.y;
         staged[BATCH*STAGED+3*i+2] = force.z;
@@ -120,7 +123,8 @@ DEVICE void storeBlock(const real* sums, int4 corner, int4 size, LOCAL_ARG real*
 }
 
 /** Forces on the grid. */
-KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT cellStart,
+KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT plan,
+        GLOBAL const int* RESTRICT cellStart,
         GLOBAL const int4* RESTRICT starts, GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f,
         GLOBAL real* RESTRICT gridX, GLOBAL real* RESTRICT gridY, GLOBAL real* RESTRICT gridZ) {
     LOCAL real staged[LOCAL_REALS];
@@ -131,9 +135,9 @@ KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT cellS
     for (int block = GROUP_ID; block < blocks; block += NUM_GROUPS) {
         const int4 corner = make_int4(block/(blocksY*blocksZ)*BLOCK_X, block/blocksZ%blocksY*BLOCK_Y,
                 block%blocksZ*BLOCK_Z, 0);
-        const int2 alongX = cellsOfBlock(corner.x, BLOCK_X, size.x, cells.x);
-        const int2 alongY = cellsOfBlock(corner.y, BLOCK_Y, size.y, cells.y);
-        const int2 alongZ = cellsOfBlock(corner.z, BLOCK_Z, size.z, cells.z);
+        const int2 alongX = cellsOfBlock(corner.x, BLOCK_X, size.x, cells.x, plan);
+        const int2 alongY = cellsOfBlock(corner.y, BLOCK_Y, size.y, cells.y, plan);
+        const int2 alongZ = cellsOfBlock(corner.z, BLOCK_Z, size.z, cells.z, plan);
         real sumX[PART], sumY[PART], sumZ[PART];
         for (int k = 0; k < PART; k++)
             sumX[k] = sumY[k] = sumZ[k] = 0;
@@ -143,7 +147,7 @@ KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT cellS
             for (int first = run.x; first < run.y; first += BATCH) {
                 const int count = run.y-first < BATCH ? run.y-first : BATCH;
                 SYNC_THREADS;
-                stageParticles(first, count, corner, size, starts, weights, f, staged, touched);
+                stageParticles(first, count, corner, size, plan, starts, weights, f, staged, touched);
                 SYNC_THREADS;
                 for (int i = 0; i < count; i++) {
                     LOCAL_ARG const real* own = staged+i*STAGED;
@@ -222,7 +226,7 @@ KERNEL void scaleWaves(int4 size, int forced, real noise, int4 key, GLOBAL const
 }
 
 /** u += what the grids hold at the particles; LANES >= SUPPORT threads for each, along z. */
-KERNEL void gatherVelocities(int n, int4 size, GLOBAL const int4* RESTRICT starts,
+KERNEL void gatherVelocities(int n, int4 size, GLOBAL const int* RESTRICT plan, GLOBAL const int4* RESTRICT starts,
         GLOBAL const real* RESTRICT weights, GLOBAL const real* RESTRICT gridX, GLOBAL const real* RESTRICT gridY,
         GLOBAL const real* RESTRICT gridZ, GLOBAL real4* RESTRICT u) {
     LOCAL real sums[3*GROUP_SIZE];
