@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "CommonStepKernel.h"
-#include "Memory.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/common/ContextSelector.h"
 #include "openmm/common/IntegrationUtilities.h"
@@ -92,24 +91,43 @@ void CommonStepKernel::requireRoom(const Plan& plan, const Lattice& box) const {
     if (!message.str().empty())
         throw OpenMMException(message.str());
     // On a processor the device's memory is the machine's; of other devices OpenMM does not tell.
-    if (!device.getIsCPU())
-        return;
+    if (device.getIsCPU())
+        requireMemory(plan, box, scene.mobile.size(), memoryUse(plan));
+}
+
+MemoryUse CommonStepKernel::memoryUse(const Plan& plan) const {
     const int real = realSize(device);
-    const int neighbour = plan.sumImages ? 8 : 4;
-    requireMemory(plan, box, scene.mobile.size(),
-                  {DeviceWaveSpace::bytesPerGridPoint(plan, real), 1.5 * neighbour,
-                   DeviceWaveSpace::bytesPerParticle(plan, real) + 20.0 * 4 * real});
+    return {DeviceWaveSpace::bytesPerGridPoint(plan, real), DeviceRealSpace::bytesPerPair(plan),
+            DeviceWaveSpace::bytesPerParticle(plan, real) +
+                DeviceRealSpace::bytesPerParticle(real)};
 }
 
 void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
     requireRoom(plan, box);
-    std::unique_ptr<DeviceEngine> made(new DevicePeriodicEngine(
-        device, static_cast<int>(masses.size()), scene.mobile, plan, box, viscosity, clock));
-    engine = std::move(made);
+    ContextSelector selector(device);
+    try {
+        std::unique_ptr<DeviceEngine> made(new DevicePeriodicEngine(
+            device, static_cast<int>(masses.size()), scene.mobile, plan, box, viscosity, clock));
+        engine = std::move(made);
+    } catch (const OpenMMException& failure) {
+        const std::string what = failure.what();
+        if (what.find("Error creating array") == std::string::npos)
+            throw;
+        const MemoryUse use = memoryUse(plan);
+        std::ostringstream message;
+        message << "PSEBrownianIntegrator: the device has no room for a grid of " << plan.grid[0]
+                << " x " << plan.grid[1] << " x " << plan.grid[2] << " points ("
+                << use.perGridPoint * plan.gridPoints() / 1e9 << " GB) and " << scene.mobile.size()
+                << " particles (" << what
+                << "); loosen the tolerance, choose a smaller splitting parameter, a smaller box "
+                   "or fewer particles";
+        throw OpenMMException(message.str());
+    }
     stepsSinceStart = 0;
 }
 
 void CommonStepKernel::useFreeDraining() {
+    ContextSelector selector(device);
     engine.reset(new DeviceFreeDraining(device, static_cast<int>(masses.size()), scene.mobile,
                                         scene.radii, viscosity, clock));
     stepsSinceStart = 0;

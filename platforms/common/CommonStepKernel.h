@@ -6,6 +6,7 @@
 // share the kernels, written in OpenMM's Common compute dialect, and all code that launches them.
 
 #include "DeviceEngine.h"
+#include "Memory.h"
 #include "StepKernel.h"
 #include "openmm/common/ComputeContext.h"
 
@@ -39,6 +40,7 @@ protected:
 
 private:
     void requireRoom(const numerics::Plan& plan, const numerics::Lattice& box) const;
+    MemoryUse memoryUse(const numerics::Plan& plan) const;
     bool measures() const;
     void checkStep(OpenMM::ContextImpl& context, double dt) const;
     [[noreturn]] void refuseForce(OpenMM::ContextImpl& context) const;

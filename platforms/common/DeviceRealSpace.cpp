@@ -39,6 +39,14 @@ int DeviceRealSpace::summaryRows() {
     return 2 * LanczosTridiagonal::MAX_ITERATIONS + 1;
 }
 
+double DeviceRealSpace::bytesPerPair(const Plan& plan) {
+    return ROOM * (plan.sumImages ? sizeof(mm_int2) : sizeof(int));
+}
+
+double DeviceRealSpace::bytesPerParticle(int realSize) {
+    return 14.0 * 4 * realSize + 64;
+}
+
 DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, const Lattice& box,
                                  DevicePlaces& places, StepSummary& summary)
     : context(context), places(places), summary(summary), lanczosTolerance(plan.lanczosTolerance),

@@ -21,6 +21,10 @@ public:
     /** Rows of the StepSummary's sums that the Lanczos process may use. */
     static int summaryRows();
 
+    static double bytesPerPair(const numerics::Plan& plan);
+    /** Basis vectors of ten iterations, places, forces and velocities. */
+    static double bytesPerParticle(int realSize);
+
     void findNeighbours();
     /** Whether all neighbours found room, as the summary says; if not, there is room next time. */
     bool hadRoom();

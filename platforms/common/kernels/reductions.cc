@@ -54,30 +54,3 @@ DEVICE mixed sumOfGroups(LOCAL_ARG mixed* buffer, GLOBAL const mixed* RESTRICT p
 DEVICE mixed dotProduct(real4 v, real4 w) {
     return v.x*(mixed) w.x+v.y*(mixed) w.y+v.z*(mixed) w.z;
 }
-
-/**
- * What the host reads once in a step.
- * @param largest  [MAXIMA][groups]
- * @param partial  [sums][groups]
- * @param summary  [MAXIMA+sums]
- */
-KERNEL void summarise(int sums, int groups, GLOBAL const real* RESTRICT largest,
-        GLOBAL const mixed* RESTRICT partial, GLOBAL mixed* RESTRICT summary) {
-    LOCAL real maximaBuffer[GROUP_SIZE];
-    LOCAL mixed sumsBuffer[GROUP_SIZE];
-    for (int row = GROUP_ID; row < MAXIMA+sums; row += NUM_GROUPS) {
-        if (row < MAXIMA) {
-            real most = 0;
-            for (int i = LOCAL_ID; i < groups; i += GROUP_SIZE)
-                most = larger(most, largest[row*groups+i]);
-            most = largestInGroup(maximaBuffer, most);
-            if (LOCAL_ID == 0)
-                summary[row] = most;
-        }
-        else {
-            const mixed sum = sumOfGroups(sumsBuffer, partial+(row-MAXIMA)*groups, groups);
-            if (LOCAL_ID == 0)
-                summary[row] = sum;
-        }
-    }
-}
