@@ -2,6 +2,7 @@
 // The CPU engine on every instruction set that this machine has, and for any number of threads.
 #include "CpuEngine.h"
 #include "ParticleOrder.h"
+#include "WaveKernels.h"
 #include "numerics/Plan.h"
 #include "numerics/RealTable.h"
 #include <gtest/gtest.h>
@@ -163,7 +164,40 @@ double realSpaceError(const EngineScene& scene, const std::vector<Vec3>& exact) 
     return distance(u, exact) / norm(exact);
 }
 
+/** Largest and root mean square difference of the loops' numbers from those of NoiseText.h. */
+template <class Real> std::array<double, 2> particleNoiseErrors(int count) {
+    const NoiseKey key = {3, Stream::StepReal, 5000000000u};
+    std::vector<uint32_t> particles;
+    for (int i = 0; i < count; i++)
+        particles.push_back(40000u * i + 7);
+    std::vector<Real> z(3 * particles.size());
+    waveKernels<Real>().particleNoise(key, particles.data(), count, z.data());
+    double largest = 0, squares = 0;
+    for (int i = 0; i < count; i++) {
+        double exact[3];
+        particleNoise(key, particles[i], exact);
+        for (int c = 0; c < 3; c++) {
+            const double error = std::fabs(z[3 * size_t(i) + c] - exact[c]);
+            largest = std::max(largest, error);
+            squares += error * error;
+        }
+    }
+    return {largest, std::sqrt(squares / (3.0 * count))};
+}
+
 } // namespace
+
+TEST(CpuEngine, EveryInstructionSetDrawsTheSameNoise) {
+    for (int64_t target : runnableTargets()) {
+        SCOPED_TRACE(hwy::TargetName(target));
+        const ChosenTarget chosen(target);
+        // These loops round the uniform number to single precision: 2^-25 in x = 1 - R^2/2.
+        const auto [largest, rms] = particleNoiseErrors<float>(100001);
+        EXPECT_LT(largest, std::sqrt(2 / 33554432.0));
+        EXPECT_LT(rms, 5e-7);
+        EXPECT_LT(particleNoiseErrors<double>(100001)[0], 1e-14);
+    }
+}
 
 TEST(CpuEngine, SortingByKeyIsStable) {
     std::vector<int> start, order;
