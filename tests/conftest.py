@@ -1,27 +1,78 @@
 # SPDX-License-Identifier: MIT
-"""Runs every test with an argument `platformName` on each platform; --platform chooses."""
+"""
+Runs every test with an argument `platformName` on each platform in each precision; marks say where
+it need not run, and --platform chooses. On a platform of a device that is not there no test runs:
+test_platforms.py tells it, by a skipped test for each.
+"""
+import pytest
 
-PLATFORMS = ("Reference", "CPU")
+from platformnames import DEVICES, NAMES, VARIANTS, absence, familyOf, isDevice, isDirect
+
+NOWHERE = pytest.param(None, id="nowhere")
+MARKS = {
+    "onePrecision": "runs in one precision of a device: what it tests does not depend on it",
+    "hostOnly": "not on devices, where what it tests follows from having the noise of the CPU",
+    "deviceOnly": "runs on devices alone",
+    "withGrid": "not on a platform that sums directly",
+}
 
 
 def pytest_addoption(parser):
     parser.addoption(
         "--platform",
         action="append",
-        choices=PLATFORMS,
+        choices=list(dict.fromkeys((*VARIANTS, *NAMES))),
         help="run the tests on this platform only (may be repeated); default: all",
     )
 
 
+def pytest_configure(config):
+    for name, meaning in MARKS.items():
+        config.addinivalue_line("markers", f"{name}: {meaning}")
+
+
+def chosenNames(config):
+    """All names of platforms that --platform asks for, whether or not they are there."""
+    asked = config.getoption("platform") or VARIANTS
+    return [name for name in NAMES if name in asked or familyOf(name) in asked]
+
+
+def namesFor(chosen, marks):
+    """Those of the chosen names that are there and that the marks of a test leave."""
+    names = [name for name in chosen if not absence(familyOf(name))]
+    if "hostOnly" in marks:
+        names = [name for name in names if not isDevice(name)]
+    if "deviceOnly" in marks:
+        names = [name for name in names if isDevice(name)]
+    if "withGrid" in marks:
+        names = [name for name in names if not isDirect(name)]
+    if "onePrecision" in marks:
+        names = [name for i, name in enumerate(names)
+                 if familyOf(name) not in map(familyOf, names[:i])]
+    return names
+
+
 def pytest_generate_tests(metafunc):
+    chosen = chosenNames(metafunc.config)
     if "platformName" in metafunc.fixturenames:
-        metafunc.parametrize(
-            "platformName", metafunc.config.getoption("platform") or PLATFORMS, scope="session"
-        )
+        names = namesFor(chosen, {mark.name for mark in metafunc.definition.iter_markers()})
+        metafunc.parametrize("platformName", names or [NOWHERE], scope="session")
+    if "device" in metafunc.fixturenames:
+        devices = [device for device in DEVICES if device in map(familyOf, chosen)]
+        metafunc.parametrize("device", devices or [NOWHERE])
 
 
-def pytest_collection_modifyitems(items):
-    """What compiles recorded programs comes after all that records some."""
+def isNowhere(item):
+    parameters = item.callspec.params if hasattr(item, "callspec") else {}
+    return any(name in parameters and parameters[name] is None for name in ("platformName", "device"))
+
+
+def pytest_collection_modifyitems(config, items):
+    nowhere = [item for item in items if isNowhere(item)]
+    if nowhere:
+        items[:] = [item for item in items if item not in nowhere]
+        config.hook.pytest_deselected(items=nowhere)
+    # What compiles recorded programs comes after all that records some.
     items.sort(key=lambda item: item.path.name == "test_cuda_kernels.py")
 
 

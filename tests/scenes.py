@@ -12,6 +12,7 @@ from scipy import stats
 
 import openmmpse
 from oracle import boxVolume, mobilityMatrix
+from platformnames import contextOn
 
 ETA = 603.4
 KB = 0.00831446261815324
@@ -75,6 +76,17 @@ class Scene:
 
     def moved(self, shifts):
         return Scene(self.positions + shifts, self.box, self.radius)
+
+    def at(self, positions):
+        """The same spheres elsewhere; asked again for the same place, the same Scene."""
+        key = np.asarray(positions).tobytes()
+        if key not in self.elsewhere:
+            self.elsewhere[key] = Scene(positions, self.box, self.radius)
+        return self.elsewhere[key]
+
+    @functools.cached_property
+    def elsewhere(self):
+        return {}
 
 
 def nearestImages(r, box):
@@ -214,21 +226,13 @@ def makeSystem(scene, forces=(), masses=None):
     return system
 
 
-def platformNamed(name):
-    return openmm.Platform.getPlatformByName(name)
-
-
-def platformOptions(platformName, threads):
-    """CPU alone has threads; one by default, because most scenes are tiny."""
-    return {"Threads": str(threads)} if platformName == "CPU" else {}
-
-
 def makeContext(scene, platformName, temperature=0.0, stepSize=1.0, tolerance=None, seed=5,
                 forces=(), masses=None, threads=1, configure=None,
                 boundary=openmmpse.PSEBrownianIntegrator.Periodic):
     """
     A Context with positions set, and its integrator.
 
+    threads    one by default, because most scenes are tiny
     configure  called with the integrator before the Context is made
     boundary   what surrounds the particles
     """
@@ -239,8 +243,7 @@ def makeContext(scene, platformName, temperature=0.0, stepSize=1.0, tolerance=No
         integrator.setErrorTolerance(tolerance)
     if configure is not None:
         configure(integrator)
-    context = openmm.Context(makeSystem(scene, forces, masses), integrator,
-                             platformNamed(platformName), platformOptions(platformName, threads))
+    context = contextOn(platformName, makeSystem(scene, forces, masses), integrator, threads)
     context.setPositions(scene.positions)
     return context, integrator
 
@@ -248,6 +251,15 @@ def makeContext(scene, platformName, temperature=0.0, stepSize=1.0, tolerance=No
 def positionsOf(context):
     """Positions (N,3) in nm, not wrapped into the box."""
     return np.array(context.getState(positions=True).getPositions(asNumpy=True)._value)
+
+
+def stored(scene, context):
+    """
+    The scene at the positions that the Context holds: where they are floats, an oracle to compare
+    with at a tolerance of 1e-5 must be asked there.
+    """
+    positions = positionsOf(context)
+    return scene if abs(positions - scene.positions).max() < 1e-12 else scene.at(positions)
 
 
 def velocitiesOf(context):

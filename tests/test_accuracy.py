@@ -19,6 +19,9 @@ from openmmpse import PSEBrownianIntegrator, accuracy
 from openmmpse.accuracy import command, limits, report, stages, tuning
 from openmmpse.accuracy.limits import Limits, recommend
 from openmmpse.accuracy.scene import Scene, SceneError
+from platformnames import contextOn, familyOf, isDirect, lowestTolerance, platformOptions
+
+pytestmark = pytest.mark.onePrecision
 
 TEMPERATURE, STEP = 293.15, 1.0
 KT = scenes.KB*TEMPERATURE
@@ -42,31 +45,34 @@ def small():
 
 def sceneOf(small, platformName="CPU", temperature=TEMPERATURE, forces=None, masses=None):
     system = scenes.makeSystem(small, [springs(small)] if forces is None else forces, masses)
-    options = scenes.platformOptions(platformName, 1)
+    options = platformOptions(platformName, 1)
     integrator = template(temperature, small.radius)
-    return Scene(system, small.positions, integrator, platform=platformName, properties=options)
+    return Scene(system, small.positions, integrator, platform=familyOf(platformName), properties=options)
 
 
 # ---------------------------------------------------------------- the sweep
 
 def testErrorsAreThoseAgainstTheOracleAndKeepTheTolerance(small, platformName):
+    tightest = lowestTolerance(platformName)  # that of the run which errors are measured against
+    expected = [tolerance for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5) if tolerance > 9*tightest]
     result = accuracy.measure(sceneOf(small, platformName), rounds=1, tolerances=(1e-1, 1e-2, 1e-3, 1e-4, 1e-5))
-    assert result.complete and result.referenceTolerance == pytest.approx(1e-10)
-    assert [row.tolerance for row in result.rows] == pytest.approx([1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+    assert result.complete and result.referenceTolerance == pytest.approx(tightest)
+    assert [row.tolerance for row in result.rows] == pytest.approx(expected)
     for row in result.rows:
         assert set(row.errors) == {"random", "uniform", "scene"}
         assert all(0 < error <= row.tolerance for error in row.errors.values())
         assert row.seconds > 0 and row.bareSeconds > 0 and sum(row.stages.values()) == pytest.approx(1, abs=0.06)
     for kind in ("random", "uniform", "scene"):
         errors = [row.errors[kind] for row in result.rows]
-        assert errors[4] < 1e-2*errors[1] < 1e-1*errors[0]
+        assert errors[3] < 1e-1*errors[1] < 1e-1*errors[0]
+        assert len(errors) == 4 or errors[4] < 1e-2*errors[1]
     # the same numbers from the dense matrix, which knows nothing of tolerances
     context, integrator = scenes.makeContext(small, platformName, tolerance=1e-2, forces=[springs(small)],
                                              temperature=TEMPERATURE)
     force = np.array(context.getState(forces=True).getForces(asNumpy=True)._value)
     uniform = scenes.uniformForces(small)
     for kind, forces in (("scene", force), ("uniform", uniform)):
-        assert result.rows[1].errors[kind] == pytest.approx(scenes.errorOf(integrator, forces, small), rel=1e-5)
+        assert result.rows[1].errors[kind] == pytest.approx(scenes.errorOf(integrator, forces, small), rel=max(1e-5, 20*tightest))
 
 
 def testNoiseIsCovarianceErrorPlusTwiceTheLanczosError(small, platformName):
@@ -74,7 +80,7 @@ def testNoiseIsCovarianceErrorPlusTwiceTheLanczosError(small, platformName):
     result = accuracy.measure(scene, rounds=1, tolerances=(1e-1, 1e-3))
     for row in result.rows:
         assert row.noise == row.plainErrors["random"] + 2*row.lanczosError
-        if platformName == "Reference":  # its Lanczos process is as tight as the one it is compared with
+        if isDirect(platformName):  # its Lanczos process is as tight as the one it is compared with
             assert row.lanczosError == 0
         else:
             assert 0 < row.lanczosError < 2*row.parameters["lanczosTolerance"]
@@ -311,7 +317,7 @@ def testTuningOffersWhatTheIntegratorAccepts(small, platformName):
         integrator = template(radius=small.radius)
         integrator.setErrorTolerance(1e-2)
         integrator.setNumericalParameters(candidate.settings)
-        context = openmm.Context(scenes.makeSystem(small), integrator, scenes.platformNamed(platformName))
+        context = contextOn(platformName, scenes.makeSystem(small), integrator)
         used = integrator.getNumericalParameters()
         del context
         for key in ("xi", "gridDimensions", "windowSupport", "realCutoff"):

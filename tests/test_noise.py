@@ -15,6 +15,7 @@ import pytest
 from scipy import stats
 
 from openmmpse import PSEBrownianIntegrator
+from platformnames import coordinateRounding, served
 import scenes
 from scenes import (FALSE_ALARM, KB, assertUnitCovariance, assertZeroMean, makeContext,
                     mobilityColumns, positionsOf, randomForces, whiten, zScore)
@@ -22,6 +23,8 @@ from scenes import (FALSE_ALARM, KB, assertUnitCovariance, assertZeroMean, makeC
 T = 300.0
 DT = 2.0
 VARIANCE = 2*KB*T*DT
+SPLITS = {"automatic": PSEBrownianIntegrator.AutomaticSplit,
+          "Prolate": PSEBrownianIntegrator.Prolate, "Hasimoto": PSEBrownianIntegrator.Hasimoto}
 
 
 def flat(samples):
@@ -58,6 +61,7 @@ def suspension(seed=101, N=8, box=scenes.tilted(1)):
     return scenes.randomSuspension(N, 0.15, box, 0.5, seed)
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- covariance
 
 @pytest.mark.parametrize("name, xi, split", [
@@ -79,9 +83,7 @@ def testCovarianceIsThatOfTheMobility(platformName, name, xi, split):
 
     def configure(i):
         i.setSplittingParameter(xi)
-        i.setSplit({"automatic": PSEBrownianIntegrator.AutomaticSplit,
-                    "Prolate": PSEBrownianIntegrator.Prolate,
-                    "Hasimoto": PSEBrownianIntegrator.Hasimoto}[split])
+        i.setSplit(SPLITS[split])
     # Boxes of a few radii have room for the prolate split at loose tolerances only; 1e-2 in M is
     # far below what 5000 samples resolve.
     context, integrator = makeContext(s, platformName, T, DT, 1e-2 if split == "Prolate" else 1e-4,
@@ -91,6 +93,7 @@ def testCovarianceIsThatOfTheMobility(platformName, name, xi, split):
     assertZeroMean(y, name)
 
 
+@pytest.mark.hostOnly
 @pytest.mark.parametrize("shape, grid", [("cube", (6, 6, 6)), ("cube", (7, 7, 7)),
                                          ("cube", (6, 5, 8)), ("tilted", (6, 6, 6)),
                                          ("tilted", (5, 6, 7))])
@@ -115,6 +118,7 @@ def testNyquistAndConjugatePlanes(platformName, shape, grid):
     assertUnitCovariance(y, f"grid {grid}", tests=5)
 
 
+@pytest.mark.hostOnly
 @pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
 def testRealAndWaveHalfAreIndependent(platformName, split):
     """
@@ -149,6 +153,7 @@ def testRealAndWaveHalfAreIndependent(platformName, split):
     assertUnitCovariance(whiten(total, VARIANCE*M), "sum of the halves")
 
 
+@pytest.mark.onePrecision
 def testFreeDrainingCovariance(platformName):
     s = suspension(104, 10)
     context, integrator = makeContext(
@@ -159,6 +164,7 @@ def testFreeDrainingCovariance(platformName):
     assertZeroMean(y, "free draining")
 
 
+@pytest.mark.onePrecision
 def testNormality(platformName):
     """
     Kolmogorov-Smirnov for each whitened number, and the pooled excess kurtosis, whose standard
@@ -175,6 +181,7 @@ def testNormality(platformName):
     assert abs(excess) < stats.norm.isf(FALSE_ALARM/2)*np.sqrt(96/y.size)
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- a thermal step
 
 def testCovarianceAndMeanOfThermalSteps(platformName):
@@ -199,6 +206,7 @@ def testForcesAndNoiseAdd(platformName, tolerance):
     """Same seed, with and without forces: the steps differ by dt M f, to rounding."""
     s = suspension(107, 12)
     forces = randomForces(s)*np.sqrt(VARIANCE/s.mu0)/DT
+    tolerance = served(platformName, tolerance)
     ends = []
     for f in (forces, 0*forces):
         context, integrator = makeContext(s, platformName, T, DT, tolerance,
@@ -207,32 +215,73 @@ def testForcesAndNoiseAdd(platformName, tolerance):
         integrator.step(1)
         ends.append(positionsOf(context))
     drift = DT*u
-    rounding = 3e-6 if integrator.getNumericalParameters()["precision"] == "single" else 1e-11
-    noise = np.linalg.norm(ends[1] - s.positions)
-    assert np.linalg.norm(ends[0] - ends[1] - drift) < rounding*(noise + np.linalg.norm(drift))
+    rounding = 1e-11 if integrator.getNumericalParameters()["precision"] == "double" else 3e-6
+    limit = rounding*(np.linalg.norm(ends[1] - s.positions) + np.linalg.norm(drift))
+    limit += coordinateRounding(platformName)*sum(np.linalg.norm(end) for end in ends)
+    assert np.linalg.norm(ends[0] - ends[1] - drift) < limit
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
-def testReferenceAndCpuTakeTheSameThermalStep(tolerance):
-    """Same seed and Plan: equal to sqrt(tolerance) of the displacement (one has no window)."""
-    s = suspension(108, 25)
-    context, cpu = makeContext(s, "CPU", T, DT, tolerance, seed=9)
-    parameters = cpu.getNumericalParameters()
-    other, reference = makeContext(s, "Reference", T, DT, tolerance, seed=9,
-                                   configure=lambda i: i.setNumericalParameters(parameters))
-    for step in range(3):
+def assertSameNoise(first, second, limit, steps=3, samples=20):
+    """
+    Two Contexts (each with its integrator) move the particles alike, within a limit relative to the
+    displacement, in a few steps and in samples. Both start where the first one holds the particles.
+    """
+    (context, integrator), (other, twin) = first, second
+    for step in range(steps):
         start = positionsOf(context)
         other.setPositions(start)
-        cpu.step(1)
-        reference.step(1)
+        integrator.step(1)
+        twin.step(1)
         moved = np.linalg.norm(positionsOf(context) - start)
-        difference = np.linalg.norm(positionsOf(context) - positionsOf(other))
-        ratio = difference/moved
-        assert ratio <= np.sqrt(tolerance), f"step {step}: {ratio:.2e} of the displacement"
-    context.setPositions(s.positions)
-    other.setPositions(s.positions)
-    x, y = samplesOf(cpu, 20), samplesOf(reference, 20)
-    assert np.all(np.linalg.norm(x - y, axis=1) <= np.sqrt(tolerance)*np.linalg.norm(y, axis=1))
+        ratio = np.linalg.norm(positionsOf(context) - positionsOf(other))/moved
+        assert ratio <= limit, f"step {step}: {ratio:.2e} of the displacement"
+    other.setPositions(positionsOf(context))
+    x, y = samplesOf(integrator, samples), samplesOf(twin, samples)
+    ratio = np.max(np.linalg.norm(x - y, axis=1)/np.linalg.norm(y, axis=1))
+    assert ratio <= limit, f"samples: {ratio:.2e} of the displacement"
+
+
+@pytest.mark.withGrid
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
+def testReferenceTakesTheSameThermalStep(platformName, tolerance):
+    """Same seed and Plan: equal to sqrt(tolerance) of the displacement (one has no window)."""
+    tolerance = served(platformName, tolerance)
+    s = suspension(108, 25)
+    gridded = makeContext(s, platformName, T, DT, tolerance, seed=9)
+    parameters = gridded[1].getNumericalParameters()
+    direct = makeContext(s, "Reference", T, DT, tolerance, seed=9,
+                         configure=lambda i: i.setNumericalParameters(parameters))
+    assertSameNoise(gridded, direct, np.sqrt(tolerance))
+
+
+@pytest.mark.deviceOnly
+@pytest.mark.parametrize("box, grid, split, tolerance", [
+    ("tilted", None, "Prolate", 1e-3), ("tilted", None, "Hasimoto", 1e-5),
+    ("cube", None, "Hasimoto", 1e-8), ("elongated", None, "automatic", 1e-4),
+    ("cube", (12, 12, 12), "Hasimoto", 1e-5), ("cube", (13, 13, 13), "Hasimoto", 1e-5),
+    ("tilted", (12, 13, 15), "Hasimoto", 1e-5), ("tilted", (13, 12, 14), "Hasimoto", 1e-5)])
+def testDevicesHaveTheNoiseOfTheCpu(platformName, box, grid, split, tolerance):
+    """
+    Same seed and Plan, all particles massive but two: equal to the tolerance, mode by mode and
+    particle by particle. What is shown of the CPU's noise (its covariance, its independence, its
+    Nyquist and conjugate planes) is shown of theirs by this. Prescribed grids are odd, even and
+    unequal, and coarse enough for every mode to matter.
+    """
+    tolerance = served(platformName, tolerance)
+    shapes = {"cube": scenes.cube, "tilted": scenes.tilted, "elongated": scenes.elongated}
+    s = suspension(108, 25, shapes[box](1))
+    masses = [0.0 if i in (4, 17) else 1.0 for i in range(s.count)]
+
+    def configure(i):
+        i.setSplit(SPLITS[split])
+        if grid:
+            i.setSplittingParameter(2.0)
+            i.setGridDimensions(*grid)
+    host = makeContext(s, "CPU", T, DT, tolerance, seed=9, masses=masses, configure=configure)
+    parameters = host[1].getNumericalParameters()
+    device = makeContext(s, platformName, T, DT, tolerance, seed=9, masses=masses,
+                         configure=lambda i: i.setNumericalParameters(parameters))
+    assertSameNoise(device, host, tolerance)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
@@ -250,6 +299,7 @@ def testThreadsDoNotChangeABit(tolerance):
     assert np.array_equal(results[0][1], results[1][1])
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- streams, seeds and counters
 
 def testStreamsAreIndependent(platformName):
@@ -338,8 +388,9 @@ def testNoNoiseAtZeroTemperature(platformName):
     s = suspension(115)
     context, integrator = makeContext(s, platformName, 0.0, DT)
     assert not np.any(samplesOf(integrator, 3))
+    start = positionsOf(context)
     integrator.step(5)
-    assert np.array_equal(positionsOf(context), s.positions)
+    assert np.array_equal(positionsOf(context), start)
 
 
 @pytest.mark.parametrize("start", [0.0, 300.0])
@@ -368,6 +419,7 @@ def testTemperatureAndStepSizeActAtTheNextStep(platformName, start):
     assert not np.any(integrator.sampleBrownianDisplacements(2))
 
 
+@pytest.mark.onePrecision
 def testMasslessParticlesGetNoNoise(platformName):
     """And the others get that of a fluid without them."""
     s = suspension(117)

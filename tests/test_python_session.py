@@ -19,6 +19,9 @@ from openmm import app, unit
 
 import openmmpse
 from openmmpse import PSEBrownianIntegrator
+from platformnames import contextOn, platformNamed, platformOptions
+
+pytestmark = pytest.mark.onePrecision
 
 COUNT = 6
 BOX = 4.0
@@ -91,13 +94,12 @@ def makeSimulation(platformName, seed=1):
     chain = topology.addChain()
     for _ in range(COUNT):
         topology.addAtom("B", app.Element.getBySymbol("C"), topology.addResidue("BEA", chain))
-    options = [{"Threads": "1"}] if platformName == "CPU" else []
     simulation = app.Simulation(
         topology,
         makeSystem(),
         makeIntegrator(seed),
-        openmm.Platform.getPlatformByName(platformName),
-        *options,
+        platformNamed(platformName),
+        platformOptions(platformName, 1),
     )
     simulation.context.setPositions(ring())
     return simulation
@@ -154,9 +156,7 @@ def testCopiesCanMoveASystem(platformName):
         copy.deepcopy(makeIntegrator()),
         pickle.loads(pickle.dumps(makeIntegrator())),
     ):
-        context = openmm.Context(
-            makeSystem(), integrator, openmm.Platform.getPlatformByName(platformName)
-        )
+        context = contextOn(platformName, makeSystem(), integrator)
         context.setPositions(ring())
         integrator.step(3)
         assert context.getIntegrator() is integrator

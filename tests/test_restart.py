@@ -12,7 +12,8 @@ import pytest
 
 from openmmpse import PSEBrownianIntegrator
 import scenes
-from scenes import makeContext, platformNamed, positionsOf, randomForces
+from platformnames import contextOn, served
+from scenes import makeContext, positionsOf, randomForces
 
 T, DT = 300.0, 4.0
 
@@ -56,8 +57,12 @@ def testCheckpointContinuesToTheBit(platformName, tolerance, split, before):
     of a radius in between, so that neighbour lists and iteration counts are not those of a fresh
     start.
     """
-    context, integrator = bondedContext(platformName, tolerance=tolerance)
-    assert integrator.getNumericalParameters()["split"] == split  # what this box has room for
+    tolerance = served(platformName, tolerance)
+
+    def configure(i):
+        i.setSplit(getattr(PSEBrownianIntegrator, split))
+    context, integrator = bondedContext(platformName, tolerance=tolerance, configure=configure)
+    assert integrator.getNumericalParameters()["split"] == split
     run(context, integrator, before)
     checkpoint = context.createCheckpoint()
     at = stateOf(context)
@@ -65,7 +70,7 @@ def testCheckpointContinuesToTheBit(platformName, tolerance, split, before):
     assert np.abs(expected[-1] - at[0]).max() > 0.25
     samples = integrator.sampleBrownianDisplacements(2)
 
-    other, fresh = bondedContext(platformName, tolerance=tolerance)
+    other, fresh = bondedContext(platformName, tolerance=tolerance, configure=configure)
     other.loadCheckpoint(checkpoint)
     assertSameState(stateOf(other), at)
     assert np.array_equal(run(other, fresh, 25), expected)
@@ -204,8 +209,7 @@ def testCheckpointOfAnotherIntegratorIsRefused(platformName):
     s = suspension()
     standard = openmm.BrownianIntegrator(T, 50.0, DT)
     bonds = scenes.harmonicBonds([(i, i + 1) for i in range(s.count - 1)], 1.5, 5.0)
-    theirs = openmm.Context(scenes.makeSystem(s, [bonds]), standard, platformNamed(platformName),
-                            scenes.platformOptions(platformName, 1))
+    theirs = contextOn(platformName, scenes.makeSystem(s, [bonds]), standard, 1)
     theirs.setPositions(s.positions)
     context, integrator = bondedContext(platformName)
     with pytest.raises(openmm.OpenMMException, match="checkpoint"):
@@ -301,8 +305,7 @@ def testCopiesOfAnIntegrator(platformName, way, split):
     requested = integrator.getRequestedNumericalParameters()
     assert again.getRequestedNumericalParameters() == requested
     assert (requested["prolateBandwidth"] == 11.3) == (split == "Prolate")
-    other = openmm.Context(context.getSystem(), again, platformNamed(platformName),
-                           scenes.platformOptions(platformName, 1))
+    other = contextOn(platformName, context.getSystem(), again, 1)
     other.setPositions(s.positions)
     assert np.array_equal(run(other, again, 3), run(context, integrator, 3))
 
