@@ -41,18 +41,20 @@ KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, G
     }
 }
 
-// A work group of GROUP_SIZE threads owns a block of grid points. A thread owns a part of a column
-// along z, for which it collects the forces of all particles nearby: nothing is shared, nothing
-// needs to be zero before, and sums have one order.
+// A work group owns a block of grid points and collects the forces of all particles nearby: nothing is
+// shared between groups, nothing needs to be zero before, and sums have one order. A thread owns a part
+// of a column along z. A tile is what 32 threads own: one part of 4 x 8 columns. Particles are staged
+// in local memory, with a bit for each tile that they touch.
 #define BLOCK_X 8
 #define BLOCK_Y 8
 #define BLOCK_Z 32
-#define PART 8 // points of a thread
+#define PART 8   // points of a thread
+#define TILE_X 4 // columns of a tile along x
+#define TILES_X (BLOCK_X/TILE_X)
 #define PARTS (BLOCK_Z/PART)
 #define COLUMNS (BLOCK_X*BLOCK_Y)
-#define BATCH 64 // particles in local memory at once
-#define STAGED (BLOCK_X+BLOCK_Y+BLOCK_Z)
-#define LOCAL_REALS (BATCH*(STAGED+3)) // at least COLUMNS*BLOCK_Z, for what is written in the end
+#define BATCH 64 // particles staged at once
+#define STAGED (BLOCK_X+BLOCK_Y+BLOCK_Z) // weights of a particle on the points of a block
 
 /** The weight of a window that begins at `start` on a grid point, zero beyond its support. */
 DEVICE real weightAt(int point, int start, int count, GLOBAL const int* RESTRICT plan,
@@ -70,24 +72,29 @@ DEVICE int2 cellsOfBlock(int from, int block, int count, int cells, GLOBAL const
     return cellInterval((from-reach)/count-margin, (to+reach)/count+margin, cells);
 }
 
-/** Bit p is set if a window that begins at `start` touches part p of a block along z. */
-DEVICE int touchedParts(int start, int corner, int count, GLOBAL const int* RESTRICT plan) {
-    int parts = 0;
-    for (int part = 0; part < PARTS; part++) {
-        int ahead = corner+part*PART-start;
-        if (ahead < 0)
-            ahead += count;
-        if (ahead < SUPPORT || count-ahead < PART)
-            parts |= 1 << part;
-    }
-    return parts;
+/** Whether a window that begins at `start` touches one of `points` points that begin at `corner`. */
+DEVICE int touches(int start, int corner, int points, int count, GLOBAL const int* RESTRICT plan) {
+    int ahead = corner-start;
+    if (ahead < 0)
+        ahead += count;
+    return ahead < SUPPORT || count-ahead < points;
 }
 
-/** Weights of a batch of particles on the points of a block, the parts they touch, their forces. */
+/** Bit TILES_X*part+t is set if a window touches tile t of that part of a block. */
+DEVICE int touchedTiles(int4 start, int4 corner, int4 size, GLOBAL const int* RESTRICT plan) {
+    int tiles = 0;
+    if (touches(start.y, corner.y, BLOCK_Y, size.y, plan))
+        for (int tile = 0; tile < PARTS*TILES_X; tile++)
+            if (touches(start.x, corner.x+tile%TILES_X*TILE_X, TILE_X, size.x, plan) &&
+                    touches(start.z, corner.z+tile/TILES_X*PART, PART, size.z, plan))
+                tiles |= 1 << tile;
+    return tiles;
+}
+
+/** Weights of a batch of particles on the points of a block, their forces, and the tiles they touch. */
 DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL const int* RESTRICT plan,
-        GLOBAL const int4* RESTRICT starts,
-        GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f, LOCAL_ARG real* staged,
-        LOCAL_ARG int* touched) {
+        GLOBAL const int4* RESTRICT starts, GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f,
+        LOCAL_ARG real* staged, LOCAL_ARG real4* forces, LOCAL_ARG int* tiles) {
     for (int i = LOCAL_ID; i < count*STAGED; i += GROUP_SIZE) {
         const int particle = i/STAGED, point = i%STAGED;
         const int4 start = starts[first+particle];
@@ -100,17 +107,14 @@ DEVICE void stageParticles(int first, int count, int4 corner, int4 size, GLOBAL 
             staged[i] = weightAt(corner.z+point-BLOCK_X-BLOCK_Y, start.z, size.z, plan, own+2*SUPPORT);
     }
     for (int i = LOCAL_ID; i < count; i += GROUP_SIZE) {
-        const real4 force = f[first+i];
-        touched[i] = touchedParts(starts[first+i].z, corner.z, size.z, plan);
-        staged[BATCH*STAGED+3*i] = force.x;
-        staged[BATCH*STAGED+3*i+1] = force.y;
-        staged[BATCH*STAGED+3*i+2] = force.z;
+        forces[i] = f[first+i];
+        tiles[i] = touchedTiles(starts[first+i], corner, size, plan);
     }
 }
 
 /** Write one component of a block, neighbouring threads to neighbouring points. */
 DEVICE void storeBlock(const real* sums, int4 corner, int4 size, LOCAL_ARG real* buffer, GLOBAL real* RESTRICT grid) {
-    const int column = LOCAL_ID/PARTS, part = LOCAL_ID%PARTS;
+    const int column = LOCAL_ID%COLUMNS, part = LOCAL_ID/COLUMNS;
     SYNC_THREADS;
     for (int k = 0; k < PART; k++)
         buffer[column*BLOCK_Z+part*PART+k] = sums[k];
@@ -122,16 +126,25 @@ DEVICE void storeBlock(const real* sums, int4 corner, int4 size, LOCAL_ARG real*
     }
 }
 
+DEVICE void addTo(real* sums, real f, real4 weights) {
+    sums[0] += f*weights.x;
+    sums[1] += f*weights.y;
+    sums[2] += f*weights.z;
+    sums[3] += f*weights.w;
+}
+
 /** Forces on the grid. */
 KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT plan,
         GLOBAL const int* RESTRICT cellStart,
         GLOBAL const int4* RESTRICT starts, GLOBAL const real* RESTRICT weights, GLOBAL const real4* RESTRICT f,
         GLOBAL real* RESTRICT gridX, GLOBAL real* RESTRICT gridY, GLOBAL real* RESTRICT gridZ) {
-    LOCAL real staged[LOCAL_REALS];
-    LOCAL int touched[BATCH];
+    LOCAL real4 stagedVectors[BATCH*STAGED/4], forces[BATCH]; // loaded as vectors where that is possible
+    LOCAL int tiles[BATCH];
+    LOCAL_ARG real* staged = (LOCAL_ARG real*) stagedVectors;
     const int blocksY = (size.y+BLOCK_Y-1)/BLOCK_Y, blocksZ = (size.z+BLOCK_Z-1)/BLOCK_Z;
     const int blocks = (size.x+BLOCK_X-1)/BLOCK_X*blocksY*blocksZ;
-    const int column = LOCAL_ID/PARTS, part = LOCAL_ID%PARTS;
+    const int column = LOCAL_ID%COLUMNS, part = LOCAL_ID/COLUMNS;
+    const int tile = 1 << (part*TILES_X+column/(TILE_X*BLOCK_Y));
     for (int block = GROUP_ID; block < blocks; block += NUM_GROUPS) {
         const int4 corner = make_int4(block/(blocksY*blocksZ)*BLOCK_X, block/blocksZ%blocksY*BLOCK_Y,
                 block%blocksZ*BLOCK_Z, 0);
@@ -147,20 +160,19 @@ KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT plan,
             for (int first = run.x; first < run.y; first += BATCH) {
                 const int count = run.y-first < BATCH ? run.y-first : BATCH;
                 SYNC_THREADS;
-                stageParticles(first, count, corner, size, plan, starts, weights, f, staged, touched);
+                stageParticles(first, count, corner, size, plan, starts, weights, f, staged, forces, tiles);
                 SYNC_THREADS;
                 for (int i = 0; i < count; i++) {
-                    LOCAL_ARG const real* own = staged+i*STAGED;
-                    const real w = own[column/BLOCK_Y]*own[BLOCK_X+column%BLOCK_Y];
-                    if (w == 0 || (touched[i] >> part & 1) == 0)
+                    if ((tiles[i] & tile) == 0)
                         continue;
-                    LOCAL_ARG const real* alongPart = own+BLOCK_X+BLOCK_Y+part*PART;
-                    LOCAL_ARG const real* force = staged+BATCH*STAGED+3*i;
-                    const real fx = w*force[0], fy = w*force[1], fz = w*force[2];
-                    for (int k = 0; k < PART; k++) {
-                        sumX[k] += fx*alongPart[k];
-                        sumY[k] += fy*alongPart[k];
-                        sumZ[k] += fz*alongPart[k];
+                    const real w = staged[i*STAGED+column/BLOCK_Y]*staged[i*STAGED+BLOCK_X+column%BLOCK_Y];
+                    const real4 force = forces[i];
+                    const real fx = w*force.x, fy = w*force.y, fz = w*force.z;
+                    for (int k = 0; k < PART; k += 4) {
+                        const real4 along = stagedVectors[(i*STAGED+BLOCK_X+BLOCK_Y+part*PART+k)/4];
+                        addTo(sumX+k, fx, along);
+                        addTo(sumY+k, fy, along);
+                        addTo(sumZ+k, fz, along);
                     }
                 }
             }
