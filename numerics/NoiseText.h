@@ -52,6 +52,15 @@ DEVICE mm_ulong modeIndex(int n1, int n2, int n3) {
     return p1 | (p2 << 21) | (p3 << 42);
 }
 
+/* Leading zeros of a word that is not zero. */
+#if defined(__OPENCL_VERSION__)
+#define LEADING_ZEROS(word) ((int)clz(word))
+#elif defined(__CUDACC__)
+#define LEADING_ZEROS(word) __clz((int)(word))
+#else
+#define LEADING_ZEROS(word) __builtin_clz(word)
+#endif
+
 #ifdef USE_DOUBLE_PRECISION
 
 /** -ln((word + 1/2)/2^32) > 0. The argument is exact: 33 bits. */
@@ -71,14 +80,6 @@ DEVICE real positiveRoot(real x) {
 }
 
 #else
-
-#if defined(__OPENCL_VERSION__)
-#define LEADING_ZEROS(word) ((int)clz(word))
-#elif defined(__CUDACC__)
-#define LEADING_ZEROS(word) __clz((int)(word))
-#else
-#define LEADING_ZEROS(word) __builtin_clz(word)
-#endif
 
 /**
  * -ln((word + 1/2)/2^32) > 0 to a relative error of 1.61e-7, for every word.

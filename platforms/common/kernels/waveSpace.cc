@@ -44,7 +44,7 @@ KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, G
 // A work group owns a block of grid points and collects the forces of all particles nearby: nothing is
 // shared between groups, nothing needs to be zero before, and sums have one order. A thread owns a part
 // of a column along z. A tile is what 32 threads own: one part of 4 x 8 columns. Particles are staged
-// in local memory, with a bit for each tile that they touch.
+// in local memory, and each tile is told by bits which of them it has to look at.
 #define BLOCK_X 8
 #define BLOCK_Y 8
 #define BLOCK_Z 32
@@ -53,7 +53,9 @@ KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, G
 #define TILES_X (BLOCK_X/TILE_X)
 #define PARTS (BLOCK_Z/PART)
 #define COLUMNS (BLOCK_X*BLOCK_Y)
+#define TILES (PARTS*TILES_X)
 #define BATCH 64 // particles staged at once
+#define WORDS (BATCH/32)
 #define STAGED (BLOCK_X+BLOCK_Y+BLOCK_Z) // weights of a particle on the points of a block
 
 /** The weight of a window that begins at `start` on a grid point, zero beyond its support. */
@@ -84,7 +86,7 @@ DEVICE int touches(int start, int corner, int points, int count, GLOBAL const in
 DEVICE int touchedTiles(int4 start, int4 corner, int4 size, GLOBAL const int* RESTRICT plan) {
     int tiles = 0;
     if (touches(start.y, corner.y, BLOCK_Y, size.y, plan))
-        for (int tile = 0; tile < PARTS*TILES_X; tile++)
+        for (int tile = 0; tile < TILES; tile++)
             if (touches(start.x, corner.x+tile%TILES_X*TILE_X, TILE_X, size.x, plan) &&
                     touches(start.z, corner.z+tile/TILES_X*PART, PART, size.z, plan))
                 tiles |= 1 << tile;
@@ -126,6 +128,17 @@ DEVICE void storeBlock(const real* sums, int4 corner, int4 size, LOCAL_ARG real*
     }
 }
 
+/** Bit i%32 of words[tile][i/32] is set if particle i of the batch touches the tile. */
+DEVICE void collectBits(int count, LOCAL_ARG const int* tiles, LOCAL_ARG unsigned int* words) {
+    for (int i = LOCAL_ID; i < TILES*WORDS; i += GROUP_SIZE) {
+        const int first = i%WORDS*32, end = first+32 < count ? first+32 : count;
+        unsigned int word = 0;
+        for (int particle = first; particle < end; particle++)
+            word |= (unsigned int) (tiles[particle] >> (i/WORDS) & 1) << (particle-first);
+        words[i] = word;
+    }
+}
+
 DEVICE void addTo(real* sums, real f, real4 weights) {
     sums[0] += f*weights.x;
     sums[1] += f*weights.y;
@@ -140,11 +153,12 @@ KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT plan,
         GLOBAL real* RESTRICT gridX, GLOBAL real* RESTRICT gridY, GLOBAL real* RESTRICT gridZ) {
     LOCAL real4 stagedVectors[BATCH*STAGED/4], forces[BATCH]; // loaded as vectors where that is possible
     LOCAL int tiles[BATCH];
+    LOCAL unsigned int words[TILES*WORDS];
     LOCAL_ARG real* staged = (LOCAL_ARG real*) stagedVectors;
     const int blocksY = (size.y+BLOCK_Y-1)/BLOCK_Y, blocksZ = (size.z+BLOCK_Z-1)/BLOCK_Z;
     const int blocks = (size.x+BLOCK_X-1)/BLOCK_X*blocksY*blocksZ;
     const int column = LOCAL_ID%COLUMNS, part = LOCAL_ID/COLUMNS;
-    const int tile = 1 << (part*TILES_X+column/(TILE_X*BLOCK_Y));
+    const int tile = part*TILES_X+column/(TILE_X*BLOCK_Y);
     for (int block = GROUP_ID; block < blocks; block += NUM_GROUPS) {
         const int4 corner = make_int4(block/(blocksY*blocksZ)*BLOCK_X, block/blocksZ%blocksY*BLOCK_Y,
                 block%blocksZ*BLOCK_Z, 0);
@@ -162,19 +176,21 @@ KERNEL void spreadForces(int4 size, int4 cells, GLOBAL const int* RESTRICT plan,
                 SYNC_THREADS;
                 stageParticles(first, count, corner, size, plan, starts, weights, f, staged, forces, tiles);
                 SYNC_THREADS;
-                for (int i = 0; i < count; i++) {
-                    if ((tiles[i] & tile) == 0)
-                        continue;
-                    const real w = staged[i*STAGED+column/BLOCK_Y]*staged[i*STAGED+BLOCK_X+column%BLOCK_Y];
-                    const real4 force = forces[i];
-                    const real fx = w*force.x, fy = w*force.y, fz = w*force.z;
-                    for (int k = 0; k < PART; k += 4) {
-                        const real4 along = stagedVectors[(i*STAGED+BLOCK_X+BLOCK_Y+part*PART+k)/4];
-                        addTo(sumX+k, fx, along);
-                        addTo(sumY+k, fy, along);
-                        addTo(sumZ+k, fz, along);
+                collectBits(count, tiles, words);
+                SYNC_THREADS;
+                for (int k = 0; k < WORDS; k++)
+                    for (unsigned int left = words[tile*WORDS+k]; left != 0; left &= left-1) {
+                        const int i = 32*k+31-LEADING_ZEROS(left & (~left+1)); // its lowest bit
+                        const real w = staged[i*STAGED+column/BLOCK_Y]*staged[i*STAGED+BLOCK_X+column%BLOCK_Y];
+                        const real4 force = forces[i];
+                        const real fx = w*force.x, fy = w*force.y, fz = w*force.z;
+                        for (int point = 0; point < PART; point += 4) {
+                            const real4 along = stagedVectors[(i*STAGED+BLOCK_X+BLOCK_Y+part*PART+point)/4];
+                            addTo(sumX+point, fx, along);
+                            addTo(sumY+point, fy, along);
+                            addTo(sumZ+point, fz, along);
+                        }
                     }
-                }
             }
         }
         storeBlock(sumX, corner, size, staged, gridX);
