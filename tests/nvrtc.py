@@ -2,7 +2,7 @@
 """Compiles recorded device programs as OpenMM's CUDA platform would, on a machine without a GPU.
 
 A program is recorded when OPENMMPSE_KERNEL_DUMP names a folder (CONTRIBUTING.md): its precision, its
-defines and its source, as another platform has run them. OpenMM puts a text of its own in front of
+defines as GPUs get them, and its source. OpenMM puts a text of its own in front of
 it; that text is taken from its library libOpenMMCUDA.so, and the defines between the two are those
 of OpenMM 8.6 for the precision and shape of box. NVRTC then makes code for real architectures, which
 tells the registers and the memory of each kernel.

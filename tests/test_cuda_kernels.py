@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The shipped device kernels compile for CUDA and keep all registers: proved without a GPU.
 
-All programs that the tests of this session compiled on OpenCL, with the defines they had there, are
-compiled for each architecture (nvrtc.py); a few scenes are run here in any case.
+All programs that this session's tests needed on OpenCL, with the defines that a GPU gets for the same
+scene, are compiled for each architecture (nvrtc.py); a few scenes are run here in any case.
 """
 
 import os
@@ -11,12 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import openmm
 import pytest
 
 import nvrtc
 import scenes
-from openmmpse import PSEBrownianIntegrator, plugins
+from openmmpse import PSEBrownianIntegrator
+from platformnames import absence
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = ROOT / "platforms" / "common" / "kernels"
@@ -86,25 +86,15 @@ def recordScenes():
         tightest = (*loosest[:2], 1e-6 if precision == "double" else 1e-4)
         for scene, split, tolerance in [*runs, loosest, tightest]:
             runOnOpenCL(scene, precision, tolerance, lambda it: it.setSplit(split))
-        runOnOpenCL(
-            suspensions[0],
-            precision,
-            1e-3,
-            lambda it: it.setMobilityModel(PSEBrownianIntegrator.FreeDraining),
-        )
+        freely = PSEBrownianIntegrator.FreeDraining
+        runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setMobilityModel(freely))
 
 
 def runOnOpenCL(scene, precision, tolerance, configure):
     """Let the library do all it can at a scene."""
-    integrator = PSEBrownianIntegrator(300, scenes.ETA, scene.radius, 1.0)
-    integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
-    integrator.setErrorTolerance(tolerance)
-    configure(integrator)
-    platform = scenes.platformNamed("OpenCL")
-    context = openmm.Context(
-        scenes.makeSystem(scene), integrator, platform, {"Precision": precision}
+    context, integrator = scenes.makeContext(
+        scene, f"OpenCL-{precision}", 300, tolerance=tolerance, configure=configure
     )
-    context.setPositions(scene.positions)
     integrator.step(2)
     integrator.sampleBrownianDisplacements(1)
     assert np.all(np.isfinite(integrator.applyMobility(scenes.randomForces(scene))))
@@ -113,8 +103,8 @@ def runOnOpenCL(scene, precision, tolerance, configure):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """Every program that was compiled on OpenCL so far."""
-    if "OpenCL" not in plugins.platforms():
-        pytest.skip("no OpenCL device here on which to record programs (Debian: pocl-opencl-icd)")
+    if absence("OpenCL"):
+        pytest.skip(f"nothing to record programs with: {absence('OpenCL')}")
     folder = os.environ.get("OPENMMPSE_KERNEL_DUMP")
     if not folder:
         folder = str(tmp_path_factory.mktemp("kernels"))
