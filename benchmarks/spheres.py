@@ -157,9 +157,17 @@ def makeSystem(numParticles, length, repulsion=False):
 
 
 def hydrodynamic(
-    system, positions, tolerance=1e-3, temperature=TEMPERATURE, threads=2, split=None, parameters=None, step=STEP
+    system,
+    positions,
+    tolerance=1e-3,
+    temperature=TEMPERATURE,
+    threads=2,
+    split=None,
+    parameters=None,
+    step=STEP,
+    device=None,
 ):
-    """A Context on the CPU platform with positions set, and its PSEBrownianIntegrator."""
+    """A Context with positions set, and its PSEBrownianIntegrator: on the CPU, or on a device (platform, precision)."""
     integrator = PSEBrownianIntegrator(temperature, VISCOSITY, RADIUS, step)
     integrator.setErrorTolerance(tolerance)
     integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
@@ -168,12 +176,13 @@ def hydrodynamic(
         integrator.setSplit(getattr(PSEBrownianIntegrator, split))
     if parameters:
         integrator.setNumericalParameters(parameters)
-    return context(system, positions, integrator, threads), integrator
+    return context(system, positions, integrator, threads, device), integrator
 
 
-def context(system, positions, integrator, threads):
-    """A Context on the CPU platform with positions set."""
-    made = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
+def context(system, positions, integrator, threads, device=None):
+    """A Context with positions set: on the CPU platform, or on a device (platform, precision)."""
+    name, properties = (device[0], {"Precision": device[1]}) if device else ("CPU", {"Threads": str(threads)})
+    made = openmm.Context(system, integrator, openmm.Platform.getPlatformByName(name), properties)
     made.setPositions(positions)
     return made
 

@@ -4,9 +4,10 @@
     python benchmarks/traffic.py [--particles 64000] [--phi 0.1] [--tolerance 1e-3]
 
 Counted from the kernels of platforms/common in single precision; nothing is measured. The Plan is that of the CPU
-platform, which is that of all platforms. Of a kernel the largest of three times counts: bytes of its arrays over the
-bandwidth of the memory, bytes that its threads ask for over that of the second-level cache, and instructions over what
-all cores issue. DEVICE is an H100 (SXM) by its data sheet, with the share of the bandwidths that streaming kernels reach.
+platform, which is that of all platforms. Of a kernel the largest of four times counts: bytes of its arrays over the
+bandwidth of the memory, bytes that its threads ask for over that of the second-level cache, requests (lines of 128 bytes
+that a warp asks its first-level cache or local memory for) over one per clock and core, and instructions over what all
+cores issue. DEVICE is an H100 (SXM) by its data sheet, with the share of the bandwidths that streaming kernels reach.
 """
 
 import argparse
@@ -22,24 +23,30 @@ class Device(NamedTuple):
     name: str
     memory: float  # bytes/s
     cache: float  # bytes/s
+    requests: float  # lines of a warp per second
     issue: float  # instructions of one thread per second
 
 
-DEVICE = Device("H100 (SXM)", 0.85 * 3.35e12, 5.5e12, 132 * 128 * 1.7e9)
+DEVICE = Device("H100 (SXM)", 0.85 * 3.35e12, 5.5e12, 132 * 1.7e9, 132 * 128 * 1.7e9)
 
 # Instructions per item: of the compiled single-precision kernels for compute capability 9.0, loops counted through.
 CANDIDATE, POLYNOMIAL, PAIR = 22, 2, 55  # a distance tested; a coefficient; what else a neighbour costs in a product
 PARTICLE_NOISE, MODE_NOISE, MODE = 204, 353, 90
-BLOCK, TILE_THREADS = (8, 8, 32), 32  # grid points of a work group; threads of a tile
-SKIPPED, STAGED_WEIGHT, TOUCHED = 5, 14, 40  # a tile passes a particle by; a weight in local memory; a tile adds it
+BLOCK, WARP = (8, 8, 32), 32  # grid points of a work group; threads of a warp, and of a tile
+STAGED_WEIGHT, COLLECTED, TOUCHED = 14, 32, 46  # a weight in local memory; a particle's bits; a tile adds a particle
 GATHER_LINE = 12  # per line of the window and lane
 FFT_PASSES = 3  # over the grid, each reading and writing all of it
+# Lines that the threads of a warp ask for at once: places of a walk through common cells, places of their own neighbours
+WALK_LINES, NEIGHBOUR_LINES = 8, 16
+TOUCHED_REQUESTS = 8  # to local memory, of a tile that adds a particle
+WINDOW_LINES = 1.25  # of a row of grid points
 
 
 class Kernel(NamedTuple):
     name: str
     memory: float  # bytes per particle, from and to the memory of the device
     cache: float  # bytes per particle that threads ask for
+    requests: float  # lines per particle
     instructions: float  # per particle
 
 
@@ -53,6 +60,7 @@ class Scene(NamedTuple):
     degrees: int  # coefficients of both polynomials
     iterations: int
     waste: float  # particles staged over those that touch a block
+    cell: float  # grid points along the edge of a column of cells
 
 
 def sceneOf(numParticles, phi, tolerance):
@@ -82,6 +90,7 @@ def sceneOf(numParticles, phi, tolerance):
         degrees=2 * (support + 6),
         iterations=plan["lanczosIterations"],
         waste=waste,
+        cell=width[0] / spacing,
     )
 
 
@@ -93,32 +102,57 @@ def overlap(support, points):
 def kernels(s):
     """All kernels of a thermal step with forces, the transforms among them."""
     P, n, g = s.support, s.neighbours, s.grid
-    product = (n * INDEX + INDEX + 2 * VECTOR, n * 2 * VECTOR, n * (PAIR + POLYNOMIAL * s.degrees))
+    product = (
+        n * INDEX + INDEX + 2 * VECTOR,
+        n * 2 * VECTOR,
+        n * (2 * NEIGHBOUR_LINES + 1 + s.degrees) / WARP,
+        n * (PAIR + POLYNOMIAL * s.degrees),
+    )
     blocks = overlap(P, BLOCK[0]) * overlap(P, BLOCK[1]) * overlap(P, BLOCK[2])
-    staged = s.waste * blocks
-    tiles = blocks / overlap(P, 8) / overlap(P, 8) / overlap(P, 32) * overlap(P, 4) * overlap(P, 8) * overlap(P, 8)
+    staged, points = s.waste * blocks, sum(BLOCK)
+    tiles = overlap(P, 4) * overlap(P, 8) * overlap(P, 8)  # that a particle touches
     weights = 3 * P * REAL
-    spreadCache = staged * (sum(BLOCK) * REAL + 2 * VECTOR)
-    spreadWork = staged * (sum(BLOCK) * STAGED_WEIGHT + 256 * SKIPPED) + tiles * TILE_THREADS * TOUCHED
     lanes = 4 if P <= 4 else (8 if P <= 8 else 16)
-    gatherCache = 3 * P * P * (SECTOR + P * REAL)  # lines of P points, now and then across two sectors
+    # What the particles of a work group ask for together: a column of cells, and a window around it
+    together = 256 / lanes
+    width, depth = s.cell + P, together * g / s.cell**2 + P
+    rows = 3 * P * P
     m = s.iterations
     return [
-        Kernel("sorting by cells", 52 + 64 + 92, 0, 60 + 400),
-        Kernel("window weights", VECTOR + weights + VECTOR, 3 * P * VECTOR, 3 * P * (20 + POLYNOMIAL * (P + 3))),
-        Kernel("neighbours", VECTOR + n * INDEX, s.candidates * VECTOR, s.candidates * CANDIDATE),
-        Kernel("forces and positions", 3 * SECTOR + VECTOR + 6 * SECTOR, 0, 60),
+        Kernel("sorting by cells", 52 + 64 + 92, 0, 6, 460),
+        Kernel("window weights", 2 * VECTOR + weights, 3 * P * VECTOR, 3 * P / 4, 3 * P * (20 + POLYNOMIAL * (P + 3))),
+        Kernel(
+            "neighbours",
+            VECTOR + n * INDEX,
+            s.candidates * VECTOR,
+            s.candidates * WALK_LINES / WARP,
+            s.candidates * CANDIDATE,
+        ),
+        Kernel("forces and positions", 9 * SECTOR + VECTOR, 0, 8, 60),
         Kernel("real-space velocities", *product),
         Kernel(
             "real-space noise (Lanczos)",
             3 * VECTOR + m * (product[0] + 4 * VECTOR) + (m + 2) * VECTOR,
             m * product[1],
-            PARTICLE_NOISE + m * (product[2] + 40),
+            m * (product[2] + 1),
+            PARTICLE_NOISE + m * (product[3] + 40),
         ),
-        Kernel("spreading", weights + 2 * VECTOR + 3 * REAL * g, spreadCache, spreadWork),
-        Kernel("Fourier transforms (six)", 6 * FFT_PASSES * 2 * REAL * g, 0, 6 * 2.5 * 24 * g / 2),
-        Kernel("waves (noise and scaling)", (6 * REAL + REAL / 2) * g, 0, (MODE_NOISE + MODE) * g / 2),
-        Kernel("gathering", weights + 3 * VECTOR + 3 * REAL * g, gatherCache, lanes * P * P * GATHER_LINE),
+        Kernel(
+            "spreading",
+            weights + 2 * VECTOR + 3 * REAL * g,
+            staged * (points * REAL + 2 * VECTOR),
+            staged * 3 * points / WARP + tiles * TOUCHED_REQUESTS,
+            staged * (points * STAGED_WEIGHT + COLLECTED) + tiles * WARP * TOUCHED,
+        ),
+        Kernel("Fourier transforms (six)", 6 * FFT_PASSES * 2 * REAL * g, 0, 0, 6 * 2.5 * 24 * g / 2),
+        Kernel("waves (noise and scaling)", (6 * REAL + REAL / 2) * g, 0, 0.25 * g, (MODE_NOISE + MODE) * g / 2),
+        Kernel(
+            "gathering",
+            weights + 3 * VECTOR + 3 * REAL * g,
+            3 * REAL * width**2 * depth / together + weights,
+            rows * WINDOW_LINES + rows / 3 * lanes / WARP,
+            lanes * P * P * GATHER_LINE,
+        ),
     ]
 
 
@@ -127,6 +161,7 @@ def timeOf(kernel, device=DEVICE):
     times = {
         "memory": kernel.memory / device.memory,
         "cache": kernel.cache / device.cache,
+        "requests": kernel.requests / device.requests,
         "instructions": kernel.instructions / device.issue,
     }
     bound = max(times, key=times.get)
@@ -139,14 +174,14 @@ def table(scene, device=DEVICE):
     total = sum(row[1] for row in rows)
     transforms = next(row[1] for row in rows if row[0].name.startswith("Fourier"))
     lines = [
-        "| kernels | bytes of memory per particle | per grid point | bytes asked of the cache | instructions |"
+        "| kernels | bytes of memory per particle | per grid point | of the cache | requests | instructions |"
         " least time, ps per particle | set by | share |",
-        "|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for kernel, seconds, bound in rows:
         lines.append(
             f"| {kernel.name} | {kernel.memory:.0f} | {kernel.memory / scene.grid:.0f} | {kernel.cache:.0f} |"
-            f" {kernel.instructions:.0f} | {1e12 * seconds:.0f} | {bound} | {100 * seconds / total:.0f} % |"
+            f" {kernel.requests:.0f} | {kernel.instructions:.0f} | {1e12 * seconds:.0f} | {bound} | {100 * seconds / total:.0f} % |"
         )
     lines += [
         "",
