@@ -80,6 +80,7 @@ def testSedimentationFollowsTheOracle(platformName):
     assert np.linalg.norm(positionsOf(context) - expected) < 3*tolerance*travelled
 
 
+@pytest.mark.onePrecision
 def testOnlyIntegrationForceGroupsAct(platformName):
     s = scenes.pair(1.4, 8.0, 0.5)
     pull = 1000.0*np.array([[1, 0, 0], [0, 1, 0]])
@@ -119,6 +120,7 @@ def testMasslessParticlesStayWhereTheyAre(platformName, model):
     assert not np.any(velocitiesOf(context)[[2, 5]])
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- one particle
 
 def testFreeDiffusion(platformName):
@@ -176,6 +178,7 @@ def dumbbells(count, k, phi, a, seed):
     return Scene(np.stack([first, second], axis=1).reshape(-1, 3), scenes.cube(L), a)
 
 
+@pytest.mark.onePrecision
 def testFreeDrainingDumbbellsHaveTheExactDiscreteVariance(platformName):
     """Constant relative mobility 2 mu0: kT/k/(1 - mu k dt/2) again, with independent copies."""
     a, product, dt = 0.5, 0.8, 4.0
@@ -239,6 +242,7 @@ def quarticWell(N):
     return force
 
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("inWell", [True, False])
 def testFreeDrainingIsBrownianIntegrator(platformName, inWell):
     """

@@ -322,6 +322,7 @@ def testStreamsAreIndependent(platformName):
                 assertNoCrossCovariance(series[x][lag:], series[y][:n - lag], f"{x}, {y}, {lag}")
 
 
+@pytest.mark.onePrecision
 def testSameSeedSameNoise(platformName):
     s = suspension(111)
     runs = []
@@ -334,6 +335,7 @@ def testSameSeedSameNoise(platformName):
     assert not np.any(runs[0][0] == runs[2][0]) and not np.any(runs[0][1] == runs[2][1])
 
 
+@pytest.mark.onePrecision
 def testDrawnSeed(platformName):
     """Seed 0: a new one for each Context, which can be read back and reproduces the run."""
     s = suspension(112)
@@ -347,6 +349,7 @@ def testDrawnSeed(platformName):
     assert np.array_equal(samplesOf(third, 2), samples)
 
 
+@pytest.mark.onePrecision
 def testRepeatedSamplesDiffer(platformName):
     """Every draw is new; how many are drawn at once does not matter (to the root's accuracy)."""
     s = suspension(113)
@@ -361,6 +364,7 @@ def testRepeatedSamplesDiffer(platformName):
     assert np.linalg.norm(flat(atOnce) - pieces) < 1e-3*np.linalg.norm(pieces)
 
 
+@pytest.mark.onePrecision
 def testSamplingLeavesTheTrajectoryAlone(platformName):
     s = suspension(114)
     bonds = [(i, i + 1) for i in range(s.count - 1)]
@@ -382,6 +386,7 @@ def testSamplingLeavesTheTrajectoryAlone(platformName):
     assert np.array_equal(*trajectories)
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- temperature and step size
 
 def testNoNoiseAtZeroTemperature(platformName):
@@ -393,6 +398,7 @@ def testNoNoiseAtZeroTemperature(platformName):
     assert np.array_equal(positionsOf(context), start)
 
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("start", [0.0, 300.0])
 def testTemperatureAndStepSizeActAtTheNextStep(platformName, start):
     """Noise scales with sqrt(T dt), also when the Context was made at zero temperature."""

@@ -97,6 +97,7 @@ def testCheckpointWithTwoThreads(tolerance):
         assert np.array_equal(fresh.applyMobility(randomForces(s)), u)
 
 
+@pytest.mark.onePrecision
 def testSampleCounterIsRestored(platformName):
     """Samples go on where they were: the ones drawn before the checkpoint do not come again."""
     context, integrator = bondedContext(platformName)
@@ -109,6 +110,7 @@ def testSampleCounterIsRestored(platformName):
     assert np.array_equal(fresh.sampleBrownianDisplacements(3), second)
 
 
+@pytest.mark.onePrecision
 def testDrawnSeedIsRestored(platformName):
     """Seed 0 in both Contexts: they draw different ones, and the checkpoint brings its own."""
     context, integrator = bondedContext(platformName, seed=0)
@@ -139,6 +141,7 @@ def testCheckpointAfterTheBoxChanged(platformName):
         assert fresh.getNumericalParameters() == integrator.getNumericalParameters()
 
 
+@pytest.mark.onePrecision
 def testFreeDrainingCheckpoint(platformName):
     def freeDraining(i):
         i.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
@@ -151,6 +154,7 @@ def testFreeDrainingCheckpoint(platformName):
     assert np.array_equal(run(other, fresh, 5), expected)
 
 
+@pytest.mark.onePrecision
 # ---------------------------------------------------------------- checkpoints of something else
 
 @pytest.mark.parametrize("what", ["tolerance", "split", "bandwidth", "xi", "grid", "window", "model",
@@ -184,6 +188,7 @@ def testCheckpointOfAnotherPlanIsRefused(platformName, what):
     assert np.array_equal(run(other, fresh, 3), run(untouched, twin, 3))
 
 
+@pytest.mark.onePrecision
 def testCheckpointOfAnotherNumberOfParticlesIsRefused(platformName):
     context, integrator = bondedContext(platformName, suspension(21))
     other, fresh = bondedContext(platformName)
@@ -191,6 +196,7 @@ def testCheckpointOfAnotherNumberOfParticlesIsRefused(platformName):
         other.loadCheckpoint(context.createCheckpoint())
 
 
+@pytest.mark.onePrecision
 def testTruncatedCheckpointIsRefused(platformName):
     """Whatever is missing at the end, it is noticed, and the Context still works."""
     context, integrator = bondedContext(platformName)
@@ -205,6 +211,7 @@ def testTruncatedCheckpointIsRefused(platformName):
     assert np.array_equal(run(other, fresh, 3), expected)
 
 
+@pytest.mark.onePrecision
 def testCheckpointOfAnotherIntegratorIsRefused(platformName):
     s = suspension()
     standard = openmm.BrownianIntegrator(T, 50.0, DT)
@@ -241,6 +248,7 @@ def testStateContinuesTheNoise(platformName):
     assert other.getStepCount() == context.getStepCount() and other.getTime() == context.getTime()
 
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("text", ["", "abc", "1.5", "12abc", "-3", "999999999999999999999"])
 def testDamagedNoiseCounterIsRefused(platformName, text):
     """The counter in the XML of a State is a plain number below 2^48, or it is named."""
@@ -256,6 +264,7 @@ def testDamagedNoiseCounterIsRefused(platformName, text):
     assert np.all(np.isfinite(run(context, integrator, 1)))
 
 
+@pytest.mark.onePrecision
 def testStateDoesNotRepeatTheNoise(platformName, tmp_path):
     """A saved State, loaded into a run of the same seed: no displacement comes again."""
     s = suspension()
@@ -272,6 +281,7 @@ def testStateDoesNotRepeatTheNoise(platformName, tmp_path):
             assert np.sum(x*y) < 0.7*np.linalg.norm(x)*np.linalg.norm(y)
 
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("way, split", [("xml", "Hasimoto"), ("deepcopy", "Hasimoto"),
                                         ("pickle", "Hasimoto"), ("xml", "Prolate")])
 def testCopiesOfAnIntegrator(platformName, way, split):
@@ -310,6 +320,7 @@ def testCopiesOfAnIntegrator(platformName, way, split):
     assert np.array_equal(run(other, again, 3), run(context, integrator, 3))
 
 
+@pytest.mark.onePrecision
 def testReinitializeStartsAfresh(platformName):
     """context.reinitialize() that preserves the state: the noise does not repeat."""
     s = suspension()
