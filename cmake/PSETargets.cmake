@@ -108,25 +108,52 @@ function(pse_python_module name interface)
     install(FILES ${folder}/${name}.py DESTINATION openmmpse)
 endfunction()
 
-# pse_tests(<folder>): one binary per Test*.cpp; each test case is a ctest of its own
+# pse_platform_test(<name>): a test per platform and precision, of a binary that takes them as
+# arguments. What a machine lacks is "Skipped" there, never passed.
+function(pse_platform_test name)
+    foreach(run IN ITEMS Reference CPU OpenCL.single OpenCL.mixed OpenCL.double
+            CUDA.single CUDA.mixed CUDA.double)
+        string(REPLACE "." ";" arguments ${run})
+        add_test(NAME ${name}.${run} COMMAND ${name} ${arguments})
+        set_tests_properties(${name}.${run} PROPERTIES
+            TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT "${PSE_PLUGIN_ENVIRONMENT}")
+    endforeach()
+endfunction()
+
+# pse_tests(<folder>): one binary per Test*.cpp; each test case is a ctest of its own, but for those
+# that run on all platforms
 function(pse_tests folder)
+    set(apiTests TestCppApi)
+    set(platformTests TestPlatforms TestPlatformSteps)
+    # escaped: a ":" separates folders for OpenMM, a ";" would separate CMake's list
+    set(PSE_PLUGIN_ENVIRONMENT
+        "OPENMM_PLUGIN_DIR=${OPENMM_DIR}/lib/plugins:${PSE_PLUGIN_OUTPUT_DIR}")
     file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/Test*.cpp)
     foreach(source IN LISTS sources)
         get_filename_component(name ${source} NAME_WE)
         add_executable(${name} ${source})
         pse_defaults(${name})
         pse_warnings(${name})
-        target_link_libraries(${name} PRIVATE psenumerics GTest::gtest_main)
+        target_link_libraries(${name} PRIVATE psenumerics)
         set(environment "")
         if(name STREQUAL "TestCpuEngine")
             target_link_libraries(${name} PRIVATE psecpu)
         endif()
-        if(name STREQUAL "TestCppApi")
+        if(name IN_LIST apiTests OR name IN_LIST platformTests)
             target_link_libraries(${name} PRIVATE PSE)
-            add_dependencies(${name} OpenMMPSEReference OpenMMPSECPU)
-            # escaped: a ":" separates folders for OpenMM, a ";" would separate CMake's list
-            set(environment "OPENMM_PLUGIN_DIR=${OPENMM_DIR}/lib/plugins:${PSE_PLUGIN_OUTPUT_DIR}")
+            set(environment ${PSE_PLUGIN_ENVIRONMENT})
+            foreach(platform IN ITEMS Reference CPU OpenCL CUDA)
+                if(TARGET OpenMMPSE${platform})
+                    add_dependencies(${name} OpenMMPSE${platform})
+                endif()
+            endforeach()
         endif()
+        if(name IN_LIST platformTests)
+            target_link_libraries(${name} PRIVATE GTest::gtest)
+            pse_platform_test(${name})
+            continue()
+        endif()
+        target_link_libraries(${name} PRIVATE GTest::gtest_main)
         gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
             PROPERTIES TIMEOUT 300 ENVIRONMENT "${environment}")
     endforeach()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The public C++ API as a C++ program uses it, on each platform: plugins loaded by OpenMM, not
 // linked.
+#include "PlatformTest.h"
 #include "OpenMM.h"
 #include "openmmpse/PSEBrownianIntegrator.h"
 #include "openmmpse/PSEKernels.h"
@@ -23,15 +24,7 @@ constexpr double ETA = 600, RADIUS = 1, BOX = 10;
 
 class CppApi : public testing::TestWithParam<const char*> {
 protected:
-    static void SetUpTestSuite() {
-        const char* folders =
-            std::getenv("OPENMM_PLUGIN_DIR"); // separated by ':', as OpenMM's Python layer reads it
-        ASSERT_NE(folders, nullptr)
-            << "set OPENMM_PLUGIN_DIR to the folders of OpenMM's plugins and of ours";
-        std::istringstream list(folders);
-        for (string folder; std::getline(list, folder, ':');)
-            Platform::loadPluginsFromDirectory(folder);
-    }
+    static void SetUpTestSuite() { platformTest::loadPlugins(); }
     Platform& platform() const { return Platform::getPlatformByName(GetParam()); }
 };
 
