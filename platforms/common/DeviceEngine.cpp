@@ -12,8 +12,8 @@ DeviceEngine::DeviceEngine(ComputeContext& context, int particles, const std::ve
                            const Lattice& box, double range, double unit, int summaryRows,
                            StageClock& clock)
     : context(context), numParticles(particles), unit(unit),
-      places(context, particles, mobile, box, range), summary(context, places.count(), summaryRows),
-      stages(context, clock) {
+      summary(context, static_cast<int>(mobile.size()), summaryRows),
+      places(context, particles, mobile, box, range, summary), stages(context, clock) {
     const int n = std::max(1, places.count());
     forces.initialize(context, n, 4 * realSize(context), "pseForces");
     u.initialize(context, n, 4 * realSize(context), "pseVelocities");

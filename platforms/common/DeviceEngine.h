@@ -55,8 +55,8 @@ protected:
     OpenMM::ComputeContext& context;
     int numParticles;
     double unit;
-    DevicePlaces places;
     StepSummary summary;
+    DevicePlaces places;
     DeviceClock stages;
     OpenMM::ComputeArray forces, u;
 

@@ -28,9 +28,9 @@ class KeyTrait : public ComputeSortImpl::SortTrait {
 } // namespace
 
 DevicePlaces::DevicePlaces(ComputeContext& context, int particles, const std::vector<int>& mobile,
-                           const numerics::Lattice& box, double range)
-    : context(context), numParticles(particles), numMobile(static_cast<int>(mobile.size())),
-      inCells(range > 0) {
+                           const numerics::Lattice& box, double range, StepSummary& summary)
+    : context(context), summary(summary), numParticles(particles),
+      numMobile(static_cast<int>(mobile.size())), inCells(range > 0) {
     const int fraction4Size = 4 * (realIsDouble(context) ? sizeof(uint64_t) : sizeof(uint32_t));
     placeArray.initialize(context, std::max(1, numMobile), fraction4Size, "psePlaces");
     slotAt.initialize<int>(context, std::max(1, numMobile), "pseSlotAt");
@@ -45,20 +45,23 @@ DevicePlaces::DevicePlaces(ComputeContext& context, int particles, const std::ve
         return;
     }
     chooseCells(box, range);
-    std::vector<int> flags(particles, 0);
-    for (int i : mobile)
-        flags[i] = 1;
-    isMobile.initialize<int>(context, particles, "pseIsMobile");
-    isMobile.upload(flags);
+    std::vector<int> ranks(particles, -1);
+    for (int i = 0; i < numMobile; i++)
+        ranks[mobile[i]] = i;
+    rankOf.initialize<int>(context, particles, "pseRankOf");
+    rankOf.upload(ranks);
     located.initialize(context, particles, fraction4Size, "pseLocated");
-    keys.initialize<uint64_t>(context, particles, "pseKeys");
+    keys.initialize<uint64_t>(context, numMobile + 1, "pseKeys");
     cellStart.initialize<int>(context, cellCount.x * cellCount.y * cellCount.z + 1, "pseCellStart");
     const numerics::Matrix3 inverse = box.vectors().inverse();
     uploadMixed(
         inverseBox, context,
         {inverse(0, 0), inverse(0, 1), inverse(1, 1), inverse(0, 2), inverse(1, 2), inverse(2, 2)},
         "pseInverseBox");
-    sort = context.createSort(new KeyTrait(), particles, false);
+    // Positions may be clustered, so not the sort for uniform keys. The other one guesses the
+    // distribution from a few keys, the first among them, and does not bear one far below its guess
+    // (what it converts to unsigned is negative then): a first key of zero leaves nothing below.
+    sort = context.createSort(new KeyTrait(), numMobile + 1, false);
     locateParticles = DeviceKernel(context, program, "locateParticles");
     placeParticles = DeviceKernel(context, program, "placeParticles");
     findCells = DeviceKernel(context, program, "findCells");
@@ -89,13 +92,14 @@ void DevicePlaces::update() {
 void DevicePlaces::sortByCells() {
     if (context.getUseMixedPrecision())
         locateParticles(numParticles, numParticles, cellCount, context.getPosq(),
-                        context.getAtomIndexArray(), isMobile, inverseBox, located, keys, slotOf,
+                        context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf,
                         context.getPosqCorrection());
     else
         locateParticles(numParticles, numParticles, cellCount, context.getPosq(),
-                        context.getAtomIndexArray(), isMobile, inverseBox, located, keys, slotOf);
+                        context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf);
     sort->sort(keys);
-    placeParticles(numMobile, numMobile, keys, slotOf, located, placeArray, slotAt);
+    placeParticles(numMobile, numMobile, keys, slotOf, located, placeArray, slotAt,
+                   summary.maxima());
     const int numCells = cellCount.x * cellCount.y * cellCount.z;
     findCells(numCells + 1, numMobile, numCells, keys, cellStart);
 }

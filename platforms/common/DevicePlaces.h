@@ -3,6 +3,7 @@
 #define OPENMMPSE_DEVICEPLACES_H_
 
 #include "DeviceArrays.h"
+#include "StepSummary.h"
 #include "openmm/common/ComputeSort.h"
 #include "numerics/Lattice.h"
 #include <vector>
@@ -23,7 +24,7 @@ public:
      * particles then stay in their own order
      */
     DevicePlaces(OpenMM::ComputeContext& context, int particles, const std::vector<int>& mobile,
-                 const numerics::Lattice& box, double range);
+                 const numerics::Lattice& box, double range, StepSummary& summary);
     /** Follow the positions of the Context. */
     void update();
 
@@ -41,10 +42,11 @@ private:
     void keepOrder();
 
     OpenMM::ComputeContext& context;
+    StepSummary& summary;
     int numParticles, numMobile;
     bool inCells;
     OpenMM::mm_int4 cellCount = {1, 1, 1, 0};
-    OpenMM::ComputeArray isMobile, particleAt, inverseBox, located, keys, slotOf;
+    OpenMM::ComputeArray rankOf, particleAt, inverseBox, located, keys, slotOf;
     OpenMM::ComputeArray placeArray, slotAt, cellStart;
     OpenMM::ComputeSort sort;
     DeviceKernel locateParticles, placeParticles, findCells, findSlots, placeInOrder;

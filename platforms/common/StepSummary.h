@@ -13,7 +13,7 @@ namespace PSE {
 class StepSummary {
 public:
     /// as in kernels/reductions.cc
-    enum Maximum { Force, Velocity, Neighbours, NUM_MAXIMA };
+    enum Maximum { Force, Velocity, Neighbours, Unsorted, NUM_MAXIMA };
 
     /** @param sums  rows of sums that there is room for */
     StepSummary(OpenMM::ComputeContext& context, int particles, int sums);
@@ -21,14 +21,17 @@ public:
     OpenMM::ComputeArray& maxima() { return largest; }
     /** [sums][groups] mixed numbers, for kernels to write and read */
     OpenMM::ComputeArray& partialSums() { return partial; }
-    /** Wait for the device, and read the maxima and the first rows of sums. */
+    /**
+     * Wait for the device, and read the maxima and the first rows of sums.
+     * @throws OpenMMException if the device has not sorted what it was given
+     */
     void read(int sums);
     double maximum(Maximum which) const { return values[which]; }
     double sum(int row) const { return values[NUM_MAXIMA + row]; }
 
 private:
     OpenMM::ComputeContext& context;
-    int groups;
+    int particles, groups;
     OpenMM::ComputeArray largest, partial, summary;
     DeviceKernel summarise;
     std::vector<double> values;

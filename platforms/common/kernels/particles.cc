@@ -3,9 +3,12 @@
 // by cells of the box and, within a cell, by their index in the System. Places depend on positions
 // alone, not on the order of slots, and with them every sum below.
 
-/** Fractions and sorting keys of all particles; those that do not move come last. */
+/**
+ * Where all particles are, and sorting keys of those that move.
+ * @param rankOf  number of a particle among those that move, negative for one that does not
+ */
 KERNEL void locateParticles(int numAtoms, int4 cells, GLOBAL const real4* RESTRICT posq,
-        GLOBAL const int* RESTRICT atomIndex, GLOBAL const int* RESTRICT isMobile,
+        GLOBAL const int* RESTRICT atomIndex, GLOBAL const int* RESTRICT rankOf,
         GLOBAL const mixed* RESTRICT inverseBox, GLOBAL fraction4* RESTRICT located,
         GLOBAL mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT slotOf
 #ifdef USE_MIXED_PRECISION
@@ -27,23 +30,38 @@ KERNEL void locateParticles(int numAtoms, int4 cells, GLOBAL const real4* RESTRI
         s.y = toFraction(inverseBox[2]*y+inverseBox[4]*z);
         s.z = toFraction(inverseBox[5]*z);
         s.w = particle;
-        int cell = cells.x*cells.y*cells.z;
-        if (isMobile[particle])
-            cell = (cellOf(s.x, cells.x)*cells.y+cellOf(s.y, cells.y))*cells.z+cellOf(s.z, cells.z);
         located[slot] = s;
-        keys[slot] = ((mm_ulong) cell << 32) | (unsigned int) particle;
         slotOf[particle] = slot;
+        const int rank = rankOf[particle];
+        if (rank >= 0) {
+            const int column = cellOf(s.x, cells.x)*cells.y+cellOf(s.y, cells.y);
+            keys[rank+1] = ((mm_ulong) (column*cells.z+cellOf(s.z, cells.z)) << 32) | (unsigned int) particle;
+        }
     }
+    if (GLOBAL_ID == 0)
+        keys[0] = 0; // see DevicePlaces
 }
 
-/** From sorted keys, what is at each place. */
+/**
+ * From sorted keys, of which the first is nobody's, what is at each place.
+ * @param largest  per group, whether keys are out of order
+ */
 KERNEL void placeParticles(int n, GLOBAL const mm_ulong* RESTRICT keys, GLOBAL const int* RESTRICT slotOf,
-        GLOBAL const fraction4* RESTRICT located, GLOBAL fraction4* RESTRICT places, GLOBAL int* RESTRICT slotAt) {
+        GLOBAL const fraction4* RESTRICT located, GLOBAL fraction4* RESTRICT places, GLOBAL int* RESTRICT slotAt,
+        GLOBAL real* RESTRICT largest) {
+    LOCAL real buffer[GROUP_SIZE];
+    real unsorted = 0;
     for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
-        const int slot = slotOf[(unsigned int) keys[place]];
+        const mm_ulong key = keys[place+1];
+        const int slot = slotOf[(unsigned int) key];
         places[place] = located[slot];
         slotAt[place] = slot;
+        if (key < keys[place])
+            unsorted = 1;
     }
+    unsorted = largestInGroup(buffer, unsorted);
+    if (LOCAL_ID == 0)
+        largest[UNSORTED*NUM_GROUPS+GROUP_ID] = unsorted;
 }
 
 /** First place of every cell, and n after the last. */
@@ -52,7 +70,7 @@ KERNEL void findCells(int n, int numCells, GLOBAL const mm_ulong* RESTRICT keys,
         int low = 0, high = n;
         while (low < high) {
             const int middle = low+(high-low)/2;
-            if ((keys[middle] >> 32) < (mm_ulong) cell)
+            if ((keys[middle+1] >> 32) < (mm_ulong) cell)
                 low = middle+1;
             else
                 high = middle;

@@ -6,7 +6,8 @@
 #define LARGEST_FORCE 0
 #define LARGEST_VELOCITY 1
 #define MOST_NEIGHBOURS 2
-#define MAXIMA 3
+#define UNSORTED 3
+#define MAXIMA 4
 
 /** The larger of two numbers; not a number if one of them is not. */
 DEVICE real larger(real a, real b) {
