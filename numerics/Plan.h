@@ -45,6 +45,8 @@ struct PlanRequest {
     bool directSums;
     PlanOverrides overrides;
     SplitChoice split = SplitChoice::Automatic;
+    /// the platform has no double precision to resort to: choose what single precision can do
+    bool singleOnly = false;
 };
 
 /** Everything a platform needs to know about the numerics. */

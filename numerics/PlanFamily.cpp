@@ -154,7 +154,8 @@ void PlanFamily::predict(Plan& plan, double wave) const {
     plan.predictedError = std::hypot(wave, realErrorOf(plan));
     const Magnification magnified =
         magnification(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
-    if (plan.predictedError < SINGLE_SHARE * request.singleFloor ||
+    const bool finer = plan.predictedError < SINGLE_SHARE * request.singleFloor;
+    if ((finer && !request.singleOnly) ||
         magnified.of(SINGLE_ROUNDING) > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
     const double usual =
@@ -298,6 +299,8 @@ Plan HasimotoPlans::at(double xi, double& cost) const {
     completeRealHalf(plan);
     chooseWindow(plan, cost);
     if (realErrorOf(plan) > 1.01 * error) // its range was cut
+        cost *= UNAFFORDABLE;
+    if (request.singleOnly && plan.precision == Precision::Double) // its range is too wide
         cost *= UNAFFORDABLE;
     return plan;
 }

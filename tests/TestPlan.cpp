@@ -380,6 +380,23 @@ TEST(Plan, PrecisionFollowsTheTolerance) {
     }
 }
 
+TEST(Plan, SinglePrecisionAloneServesEveryBoxDownToItsFloor) {
+    int inDouble = 0;
+    for (double edge : {1.3, 2.2, 3.2, 5.0, 20.0})
+        for (int n : {1, 30})
+            for (double tolerance : {1e-1, 1e-3, 1e-5}) {
+                PlanRequest r = request(Lattice::orthorhombic(edge, edge, edge), n, tolerance);
+                inDouble += (makePlan(r).precision == Precision::Double);
+                r.singleOnly = true;
+                const Plan plan = makePlan(r);
+                EXPECT_EQ(plan.precision, Precision::Single)
+                    << edge << " " << n << " " << tolerance;
+                EXPECT_LE(plan.predictedError, tolerance);
+                EXPECT_LE(plan.realCutoff / plan.a, plan.split->tableRange(true));
+            }
+    EXPECT_GT(inDouble, 0); // where there is a choice, double precision is the cheaper one
+}
+
 TEST(Plan, TinyAndHugeBoxesHavePlans) {
     EXPECT_TRUE(makePlan(request(Lattice::orthorhombic(1, 1, 1), 1, 1e-3)).sumImages);
     EXPECT_TRUE(makePlan(request(Lattice::orthorhombic(2.1, 2.1, 2.1), 1, 1e-8)).sumImages);

@@ -64,6 +64,7 @@ void CommonStepKernel::adapt(PlanRequest& request) const {
     request.singleFloor =
         realIsDouble(device) ? std::numeric_limits<double>::infinity() : SINGLE_PRECISION_FLOOR;
     request.directSums = false;
+    request.singleOnly = !realIsDouble(device);
 }
 
 std::string CommonStepKernel::precisionName(const Plan&) const {
