@@ -26,6 +26,7 @@ ARCHITECTURES = (75, 80, 90, 120)
 PRECISIONS = ("single", "mixed", "double")
 TITLE = "CUDA: registers/static shared/stack/spilled bytes, the most of any variant"
 OPTIONS = ("--use_fast_math",)  # OpenMM's own
+FLOAT = re.compile(r"(?<![\w.])-?\d+\.\d+(e[+-]?\d+)?f?", re.IGNORECASE)
 DOUBLE4 = "--diag-suppress=1444"  # CUDA 13 deprecates double4, which OpenMM's text uses
 
 
@@ -256,10 +257,27 @@ class Report:
         return "\n".join(lines)
 
 
-def compilePrograms(programs, architectures=ARCHITECTURES):
-    """Compile each program for each architecture, on all cores."""
+def everyJob(programs):
+    """Each program for each architecture."""
+    return [(program, architecture) for program in programs for architecture in ARCHITECTURES]
+
+
+def coveringJobs(programs):
+    """Each program for one architecture at least, and for all of them if it is the first of its name
+    and precision with a certain line of defines or shape of box. Floating point numbers count as
+    one, for they change no more than a constant."""
+    seen, jobs = set(), []
+    for i, program in enumerate(programs):
+        lines = {program.box, *FLOAT.sub("1.0", program.defines).splitlines()}
+        lines = {(program.name, program.precision, program.source, line) for line in lines}
+        jobs += everyJob([program]) if lines - seen else [(program, ARCHITECTURES[i % len(ARCHITECTURES)])]
+        seen |= lines
+    return jobs
+
+
+def compileJobs(jobs):
+    """Compile pairs of a program and an architecture, on all cores."""
     report = Report({}, [])
-    jobs = [(program, architecture) for program in programs for architecture in architectures]
     nvrtc()  # what is missing is told here, once
     with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         outcomes = pool.map(lambda job: compileText(job[0].text(), job[1]), jobs)
@@ -277,7 +295,7 @@ def compilePrograms(programs, architectures=ARCHITECTURES):
 
 def main(folder):
     """Print the table of a folder's programs; return 0 if all compile and none spills, else 1."""
-    report = compilePrograms(readPrograms(folder))
+    report = compileJobs(everyJob(readPrograms(folder)))
     print(f"{TITLE}\n{report.table()}")
     print("\n".join(report.errors + report.spills()))
     return 1 if report.errors or report.spills() or not report.usage else 0

@@ -2,7 +2,8 @@
 """The shipped device kernels compile for CUDA and keep all registers: proved without a GPU.
 
 All programs that this session's tests needed on OpenCL, with the defines that a GPU gets for the same
-scene, are compiled for each architecture (nvrtc.py); a few scenes are run here in any case.
+scene, are compiled for an architecture (nvrtc.py), and for each one those that are needed to see every
+define there; a few scenes are run here in any case.
 """
 
 import os
@@ -65,10 +66,10 @@ extern "C" __global__ void __launch_bounds__(1024) spilling(double* out, const d
 """
 
 
-def compiled(programs):
-    """The Report on some programs; skips if this machine cannot compile for CUDA."""
+def compiled(jobs):
+    """The Report on some jobs; skips if this machine cannot compile for CUDA."""
     try:
-        return nvrtc.compilePrograms(programs)
+        return nvrtc.compileJobs(jobs)
     except nvrtc.MissingError as missing:
         pytest.skip(str(missing))
 
@@ -124,7 +125,7 @@ def testDialectCompilesInEveryPrecision():
         for precision in nvrtc.PRECISIONS
         for box in ("rectangular", "triclinic")
     ]
-    report = compiled(programs)
+    report = compiled(nvrtc.everyJob(programs))
     assert report.errors == []
     sizes = {precision: 4 if precision != "double" else 8 for precision in nvrtc.PRECISIONS}
     assert {key[2]: set(columns) for key, columns in report.usage.items()} == {
@@ -140,19 +141,34 @@ def testOwnDefinesReplaceThoseOfOpenMM():
     assert re.findall(r"^#define RECIP\b.*", text, re.MULTILINE) == ["#define RECIP(x) (1/(x))"]
 
 
+def testEveryProgramAndEveryDefineIsCovered():
+    sizes = [programOf("", defines=f"#define A {a}\n#define B {b}") for a in "123" for b in "45"]
+    sizes.append(programOf("", defines="#define A 1\n#define B 4\n#define C 2.5f"))
+    sizes.append(programOf("", defines="#define A 1\n#define B 4\n#define C -3.5e-1f"))
+    jobs = nvrtc.coveringJobs(sizes)
+    count = {program.defines: 0 for program in sizes}
+    for program, _ in jobs:
+        count[program.defines] += 1
+    assert list(count.values()) == [4, 4, 4, 1, 4, 1, 4, 1]
+    assert len(set(jobs)) == len(jobs)
+    others = [replace(program, precision="mixed") for program in sizes]
+    assert nvrtc.coveringJobs(others + sizes)[len(jobs) :] == jobs
+
+
 def testErrorsAndSpillsAreNoticed():
     good = programOf(DIALECT)
-    report = compiled([good, replace(good, source="KERNEL void bad(GLOBAL float3* p) { p[0].xy; }")])
+    bad = replace(good, source="KERNEL void bad(GLOBAL float3* p) { p[0].xy; }")
+    report = compiled(nvrtc.everyJob([good, bad]))
     assert len(report.errors) == len(nvrtc.ARCHITECTURES)
     assert "FACTOR 2" in report.errors[0] and "xy" in report.errors[0]
     assert report.kernels() == {"dialect"} and report.spills() == []
-    report = compiled([replace(good, source=SPILLING)])
+    report = compiled(nvrtc.everyJob([replace(good, source=SPILLING)]))
     assert report.errors == []
     assert len(report.spills()) == len(nvrtc.ARCHITECTURES)
 
 
 def testShippedKernelsCompileForCudaAndDoNotSpill(recorded, record_property):
-    report = compiled(recorded)
+    report = compiled(nvrtc.coveringJobs(recorded))
     record_property(nvrtc.TITLE, report.table())
     assert report.errors == []
     assert report.spills() == []
