@@ -135,8 +135,10 @@ void CommonStepKernel::useFreeDraining() {
 }
 
 void CommonStepKernel::checkPositions(ContextImpl& context) {
-    if (positionsChecked)
-        return; // steps that would lead away from finite positions are refused
+    // Our own steps that would lead away from finite positions are refused; those of another
+    // integrator, in a CompoundIntegrator, are not.
+    if (positionsChecked && stepCountSeen == device.getStepCount())
+        return;
     vector<OmmVec3> positions;
     context.getPositions(positions);
     const double farthest = farthestPosition();
@@ -148,6 +150,7 @@ void CommonStepKernel::checkPositions(ContextImpl& context) {
             refuseFarAway(i, x);
     }
     positionsChecked = true;
+    stepCountSeen = device.getStepCount();
 }
 
 bool CommonStepKernel::measures() const {
@@ -170,6 +173,7 @@ void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator
     device.getIntegrationUtilities().computeVirtualSites();
     device.setTime(device.getTime() + dt);
     device.setStepCount(device.getStepCount() + 1);
+    stepCountSeen = device.getStepCount();
     device.reorderAtoms();
     steps++;
     stepsSinceStart++;
@@ -181,11 +185,12 @@ void CommonStepKernel::checkStep(ContextImpl& context, double dt) const {
     if (!(engine->largestForce() < LARGEST_FORCE))
         refuseForce(context);
     if (!std::isfinite(engine->largestVelocity()))
-        refuseVelocity(VELOCITY, dt);
+        refuseVelocity();
     const double largest = realIsDouble(device) ? std::numeric_limits<double>::max()
                                                 : std::numeric_limits<float>::max();
-    if (!(dt * engine->largestVelocity() < std::min(largest, farthestPosition())))
-        refuseVelocity(NEXT_POSITION, dt);
+    const double farthest = std::min(largest, farthestPosition());
+    if (!(dt * engine->largestVelocity() < farthest))
+        refuseMove(context, dt, farthest);
 }
 
 /** Name the first particle whose force the device cannot hold. */
@@ -206,18 +211,34 @@ void CommonStepKernel::refuseForce(ContextImpl& context) const {
     throw OpenMMException("PSEBrownianIntegrator: a force on this device is not finite");
 }
 
-void CommonStepKernel::refuseVelocity(const CheckedQuantity& quantity, double dt) const {
-    int worst = -1;
-    Vec3 value = Vec3::Zero();
+/** The first particle whose step dt u is not below a limit (nm), and its velocity u. */
+std::pair<int, Vec3> CommonStepKernel::firstBeyond(double dt, double limit) const {
+    std::pair<int, Vec3> first(-1, Vec3::Zero());
     for (const auto& entry : engine->velocities()) {
-        const double size = entry.second.cwiseAbs().maxCoeff();
-        const bool bad = !std::isfinite(size) || !(dt * size < farthestPosition());
-        if (bad && (worst < 0 || entry.first < worst)) {
-            worst = entry.first;
-            value = entry.second;
-        }
+        const Vec3 step = dt * entry.second;
+        const bool fine = step.allFinite() && step.cwiseAbs().maxCoeff() < limit;
+        if (!fine && (first.first < 0 || entry.first < first.first))
+            first = entry;
     }
-    refuseNotFinite(quantity, worst, value);
+    return first;
+}
+
+void CommonStepKernel::refuseVelocity() const {
+    const auto worst = firstBeyond(1, std::numeric_limits<double>::infinity());
+    refuseNotFinite(VELOCITY, worst.first, worst.second);
+}
+
+void CommonStepKernel::refuseMove(ContextImpl& context, double dt, double limit) const {
+    const auto worst = firstBeyond(dt, limit);
+    vector<OmmVec3> positions;
+    context.getPositions(positions);
+    CheckedQuantity quantity = NEXT_POSITION;
+    std::ostringstream unit;
+    unit << quantity.unit << " (farther than " << limit << " nm from this one)";
+    const std::string text = unit.str();
+    quantity.unit = text.c_str();
+    refuseNotFinite(quantity, worst.first,
+                    fromOpenMM(positions.at(worst.first)) + dt * worst.second);
 }
 
 double CommonStepKernel::computeKineticEnergy(ContextImpl&) {

@@ -44,14 +44,17 @@ private:
     bool measures() const;
     void checkStep(OpenMM::ContextImpl& context, double dt) const;
     [[noreturn]] void refuseForce(OpenMM::ContextImpl& context) const;
-    [[noreturn]] void refuseVelocity(const CheckedQuantity& quantity, double dt) const;
+    std::pair<int, numerics::Vec3> firstBeyond(double dt, double limit) const;
+    [[noreturn]] void refuseVelocity() const;
+    [[noreturn]] void refuseMove(OpenMM::ContextImpl& context, double dt, double limit) const;
     std::vector<OpenMM::Vec3> velocities(double scale) const;
 
     OpenMM::ComputeContext& device;
     int numDevices;
     std::unique_ptr<DeviceEngine> engine;
     bool positionsChecked = false;
-    int stepsSinceStart = 0; ///< with this engine; some of them are measured
+    long long stepCountSeen = -1; ///< of the Context, when its positions were fine
+    int stepsSinceStart = 0;      ///< with this engine; some of them are measured
 };
 
 } // namespace PSE
