@@ -5,7 +5,7 @@
 #ifdef USE_DOUBLE_PRECISION
 #define FRACTION_BITS 64
 #define FRACTIONS 18446744073709551616.0
-#define GRID_BITS 48 // a product with a grid dimension, at most 2^15, must fit 63 bits
+#define GRID_BITS 47 // a product with a grid dimension, at most 2^15, and what rounds it up must fit 63 bits
 typedef mm_ulong fraction;
 typedef mm_long signedFraction;
 #ifdef __OPENCL_VERSION__
