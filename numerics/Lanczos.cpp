@@ -40,8 +40,9 @@ bool LanczosTridiagonal::add(double alpha, double beta) {
     if (n == MAX_ITERATIONS) {
         std::ostringstream message;
         message << "the real-space noise did not converge in " << n
-                << " Lanczos iterations: relative change " << change << ", wanted " << tolerance
-                << ", smallest eigenvalue " << lowest << " of a largest of " << highest
+                << " Lanczos iterations: estimated relative error " << remaining(change)
+                << ", wanted " << tolerance << ", smallest eigenvalue " << lowest
+                << " of a largest of " << highest
                 << "; loosen the tolerance or set a larger splitting parameter";
         throw std::runtime_error(message.str());
     }

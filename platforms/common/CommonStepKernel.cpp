@@ -25,18 +25,21 @@ constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
 constexpr double LARGEST_FORCE = 1073741824.0;
 /// One step in so many is measured, besides the first few.
 constexpr int MEASURED_FIRST = 3, MEASURE_EVERY = 256;
+/// Of the way to the farthest position: after it positions are checked again.
+constexpr double SHORT_WAY = 1e-3;
 /// Kernels count grid points and window points with 32 bits.
-constexpr double LARGEST_INDEX = 2147483647.0;
+constexpr double LARGEST_INDEX = 2e9;
 
 } // namespace
 
 CommonStepKernel::CommonStepKernel(std::string name, const OpenMM::Platform& platform,
                                    OpenMM::ComputeContext& context, int devices)
-    : PlannedStepKernel(name, platform), device(context), numDevices(devices) {}
+    : PlannedStepKernel(name, platform), device(context), numDevices(devices), programs(context) {}
 
 CommonStepKernel::~CommonStepKernel() {
     ContextSelector selector(device);
     engine.reset();
+    programs.clear();
 }
 
 void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
@@ -51,6 +54,7 @@ void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegra
                               std::to_string(device.getMaxThreadBlockSize()) + " threads, and " +
                               std::to_string(GROUP_SIZE) +
                               " are needed; use another device or the CPU platform");
+    tolerance = integrator.getErrorTolerance();
     device.initializeContexts();
     ContextSelector selector(device);
     PlannedStepKernel::initialize(context, integrator, sceneSeen);
@@ -76,12 +80,13 @@ std::string CommonStepKernel::precisionName(const Plan&) const {
 void CommonStepKernel::requireRoom(const Plan& plan, const Lattice& box) const {
     std::ostringstream message;
     if (plan.precision == Precision::Double && !realIsDouble(device))
-        message << "PSEBrownianIntegrator: these parameters (predicted error "
-                << plan.predictedError << ") need double precision, and this Context computes the "
-                << "fluid in single precision (" << precisionName(plan)
-                << "), which serves tolerances down to " << SINGLE_PRECISION_FLOOR
-                << "; set the platform property Precision to double, loosen the tolerance, or "
-                   "leave window and grid automatic";
+        message << "PSEBrownianIntegrator: the tolerance " << tolerance << " with these parameters "
+                << "(predicted error " << plan.predictedError << ") needs double precision, and "
+                << "this Context computes the fluid in single precision (Precision "
+                << precisionName(plan) << "), which serves tolerances down to "
+                << SINGLE_PRECISION_FLOOR << "; set the platform property Precision to double, or "
+                << "loosen the tolerance, or leave automatic what is prescribed of the window, the "
+                << "grid and the splitting parameter";
     const double windows = 3.0 * plan.windowSupport * scene.mobile.size();
     if (message.str().empty() && std::max(plan.gridPoints(), windows) > LARGEST_INDEX)
         message << "PSEBrownianIntegrator: this scene needs " << plan.gridPoints()
@@ -108,7 +113,7 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
     ContextSelector selector(device);
     try {
         std::unique_ptr<DeviceEngine> made(new DevicePeriodicEngine(
-            device, static_cast<int>(masses.size()), scene.mobile, plan, box, viscosity, clock));
+            programs, static_cast<int>(masses.size()), scene.mobile, plan, box, viscosity, clock));
         engine = std::move(made);
     } catch (const OpenMMException& failure) {
         const std::string what = failure.what();
@@ -129,7 +134,7 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
 
 void CommonStepKernel::useFreeDraining() {
     ContextSelector selector(device);
-    engine.reset(new DeviceFreeDraining(device, static_cast<int>(masses.size()), scene.mobile,
+    engine.reset(new DeviceFreeDraining(programs, static_cast<int>(masses.size()), scene.mobile,
                                         scene.radii, viscosity, clock));
     stepsSinceStart = 0;
 }
@@ -137,11 +142,12 @@ void CommonStepKernel::useFreeDraining() {
 void CommonStepKernel::checkPositions(ContextImpl& context) {
     // Our own steps that would lead away from finite positions are refused; those of another
     // integrator, in a CompoundIntegrator, are not.
-    if (positionsChecked && stepCountSeen == device.getStepCount())
+    const double farthest = farthestPosition();
+    const bool near = travelled < SHORT_WAY * farthest;
+    if (positionsChecked && near && stepCountSeen == device.getStepCount())
         return;
     vector<OmmVec3> positions;
     context.getPositions(positions);
-    const double farthest = farthestPosition();
     for (int i : scene.mobile) {
         const Vec3 x = fromOpenMM(positions[i]);
         if (!x.allFinite())
@@ -150,6 +156,7 @@ void CommonStepKernel::checkPositions(ContextImpl& context) {
             refuseFarAway(i, x);
     }
     positionsChecked = true;
+    travelled = 0;
     stepCountSeen = device.getStepCount();
 }
 
@@ -170,6 +177,7 @@ void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator
     const double dt = integrator.getStepSize();
     checkStep(context, dt);
     engine->move(dt);
+    travelled += dt * engine->largestVelocity();
     device.getIntegrationUtilities().computeVirtualSites();
     device.setTime(device.getTime() + dt);
     device.setStepCount(device.getStepCount() + 1);

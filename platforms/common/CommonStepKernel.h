@@ -51,10 +51,13 @@ private:
 
     OpenMM::ComputeContext& device;
     int numDevices;
+    DevicePrograms programs;
     std::unique_ptr<DeviceEngine> engine;
     bool positionsChecked = false;
     long long stepCountSeen = -1; ///< of the Context, when its positions were fine
-    int stepsSinceStart = 0;      ///< with this engine; some of them are measured
+    double travelled = 0;         ///< at most, since positions were checked (nm)
+    double tolerance = 0;
+    int stepsSinceStart = 0; ///< with this engine; some of them are measured
 };
 
 } // namespace PSE

@@ -3,20 +3,42 @@
 #define OPENMMPSE_DEVICEARRAYS_H_
 
 #include "DeviceKernel.h"
+#include "openmm/OpenMMException.h"
 #include "openmm/common/ComputeArray.h"
+#include <memory>
 #include <vector>
 
 namespace PSE {
 
-/** Make an array hold at least `size` elements; its contents are lost if it grows. */
-inline void reserve(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context, size_t size,
-                    int elementSize, const char* name) {
-    size = std::max<size_t>(size, 1);
-    if (!array.isInitialized())
-        array.initialize(context, size, elementSize, name);
-    else if (array.getSize() < size)
-        array.resize(size);
-}
+/** An array that grows; its contents are lost when it does. */
+class GrowingArray {
+public:
+    /**
+     * Room for `size` elements.
+     * @throws OpenMMException if the device has none; the array is then empty
+     */
+    void reserve(OpenMM::ComputeContext& context, size_t size, int elementSize, const char* name) {
+        size = std::max<size_t>(size, 1);
+        if (array && array->getSize() >= size)
+            return;
+        array.reset(); // first, so that the old and the new one need not fit together
+        std::unique_ptr<OpenMM::ComputeArray> made(new OpenMM::ComputeArray());
+        try {
+            made->initialize(context, size, elementSize, name);
+        } catch (const OpenMM::OpenMMException& failure) {
+            throw OpenMM::OpenMMException(
+                "PSEBrownianIntegrator: the device has no room for an array of " +
+                std::to_string(1e-9 * size * elementSize) + " GB, " + failure.what() +
+                "; use fewer particles, a larger box, or another platform");
+        }
+        array = std::move(made);
+    }
+    size_t size() const { return array ? array->getSize() : 0; }
+    OpenMM::ComputeArray& operator*() { return *array; }
+
+private:
+    std::unique_ptr<OpenMM::ComputeArray> array;
+};
 
 /** An array of reals, or of mixed numbers, made from doubles. */
 inline void uploadReals(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,

@@ -8,16 +8,16 @@ using namespace PSE::numerics;
 
 namespace PSE {
 
-DeviceEngine::DeviceEngine(ComputeContext& context, int particles, const std::vector<int>& mobile,
+DeviceEngine::DeviceEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                            const Lattice& box, double range, double unit, int summaryRows,
                            StageClock& clock)
-    : context(context), numParticles(particles), unit(unit),
-      summary(context, static_cast<int>(mobile.size()), summaryRows),
-      places(context, particles, mobile, box, range, summary), stages(context, clock) {
+    : context(programs.context()), numParticles(particles), unit(unit),
+      summary(programs, static_cast<int>(mobile.size()), summaryRows),
+      places(programs, particles, mobile, box, range, summary), stages(programs.context(), clock) {
     const int n = std::max(1, places.count());
     forces.initialize(context, n, 4 * realSize(context), "pseForces");
     u.initialize(context, n, 4 * realSize(context), "pseVelocities");
-    const ComputeProgram program = particleProgram(context);
+    const ComputeProgram program = programs.particles();
     takeForcesKernel = DeviceKernel(context, program, "takeForces");
     takeGivenForces = DeviceKernel(context, program, "takeGivenForces");
     checkKernel = DeviceKernel(context, program, "checkVelocities");
@@ -30,12 +30,12 @@ void DeviceEngine::takeForces() {
 }
 
 void DeviceEngine::takeForces(const std::vector<double>& values) {
-    reserve(given, context, numParticles, 4 * realSize(context), "pseGivenForces");
+    given.reserve(context, numParticles, 4 * realSize(context), "pseGivenForces");
     if (realIsDouble(context))
-        given.upload(values.data());
+        (*given).upload(values.data());
     else
-        given.upload(std::vector<float>(values.begin(), values.end()).data());
-    takeGivenForces(places.count(), places.count(), places.places(), given, forces);
+        (*given).upload(std::vector<float>(values.begin(), values.end()).data());
+    takeGivenForces(places.count(), places.count(), places.places(), *given, forces);
 }
 
 void DeviceEngine::checkVelocities() {
@@ -69,16 +69,16 @@ std::vector<std::pair<int, numerics::Vec3>> DeviceEngine::velocities() const {
     return result;
 }
 
-DeviceFreeDraining::DeviceFreeDraining(ComputeContext& context, int particles,
+DeviceFreeDraining::DeviceFreeDraining(DevicePrograms& programs, int particles,
                                        const std::vector<int>& mobile,
                                        const std::vector<double>& radii, double viscosity,
                                        StageClock& clock)
-    : DeviceEngine(context, particles, mobile, Lattice::orthorhombic(1, 1, 1), 0, 1, 0, clock) {
+    : DeviceEngine(programs, particles, mobile, Lattice::orthorhombic(1, 1, 1), 0, 1, 0, clock) {
     std::vector<double> values(particles, 0.0);
     for (size_t i = 0; i < mobile.size(); i++)
         values[mobile[i]] = 1 / (6 * M_PI * viscosity * radii[i]);
     uploadReals(mobility, context, values, "pseMobility");
-    drainFreely = DeviceKernel(context, particleProgram(context), "drainFreely");
+    drainFreely = DeviceKernel(context, programs.particles(), "drainFreely");
 }
 
 void DeviceFreeDraining::setPositions() {
@@ -95,13 +95,13 @@ void DeviceFreeDraining::computeVelocities(bool forced, const Thermal* thermal) 
     stages.charge("free draining");
 }
 
-DevicePeriodicEngine::DevicePeriodicEngine(ComputeContext& context, int particles,
+DevicePeriodicEngine::DevicePeriodicEngine(DevicePrograms& programs, int particles,
                                            const std::vector<int>& mobile, const Plan& plan,
                                            const Lattice& box, double viscosity, StageClock& clock)
-    : DeviceEngine(context, particles, mobile, box, plan.realCutoff,
+    : DeviceEngine(programs, particles, mobile, box, plan.realCutoff,
                    1 / (6 * M_PI * viscosity * plan.a), DeviceRealSpace::summaryRows(), clock),
-      drag(6 * M_PI * viscosity * plan.a), realSpace(context, plan, box, places, summary),
-      waveSpace(context, plan, box, places) {}
+      drag(6 * M_PI * viscosity * plan.a), realSpace(programs, plan, box, places, summary),
+      waveSpace(programs, plan, box, places) {}
 
 void DevicePeriodicEngine::setPositions() {
     places.update();

@@ -21,7 +21,7 @@ namespace PSE {
 class DeviceEngine {
 public:
     /** @param unit  of velocities (nm/ps) */
-    DeviceEngine(OpenMM::ComputeContext& context, int particles, const std::vector<int>& mobile,
+    DeviceEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                  const numerics::Lattice& box, double range, double unit, int summaryRows,
                  StageClock& clock);
     virtual ~DeviceEngine() = default;
@@ -61,7 +61,7 @@ protected:
     OpenMM::ComputeArray forces, u;
 
 private:
-    OpenMM::ComputeArray given;
+    GrowingArray given;
     DeviceKernel takeForcesKernel, takeGivenForces, checkKernel, moveParticles;
 };
 
@@ -69,9 +69,8 @@ private:
 class DeviceFreeDraining : public DeviceEngine {
 public:
     /** @param radii  of the mobile particles (nm) */
-    DeviceFreeDraining(OpenMM::ComputeContext& context, int particles,
-                       const std::vector<int>& mobile, const std::vector<double>& radii,
-                       double viscosity, StageClock& clock);
+    DeviceFreeDraining(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
+                       const std::vector<double>& radii, double viscosity, StageClock& clock);
     void setPositions() override;
     void computeVelocities(bool forced, const Thermal* thermal) override;
     int lanczosIterations() const override { return 0; }
@@ -84,9 +83,9 @@ private:
 /** The periodic fluid. Inside, mobilities are in units of 1/(6 pi eta a). */
 class DevicePeriodicEngine : public DeviceEngine {
 public:
-    DevicePeriodicEngine(OpenMM::ComputeContext& context, int particles,
-                         const std::vector<int>& mobile, const numerics::Plan& plan,
-                         const numerics::Lattice& box, double viscosity, StageClock& clock);
+    DevicePeriodicEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
+                         const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
+                         StageClock& clock);
     void setPositions() override;
     void computeVelocities(bool forced, const Thermal* thermal) override;
     int lanczosIterations() const override { return realSpace.lanczosIterations(); }

@@ -27,15 +27,15 @@ class KeyTrait : public ComputeSortImpl::SortTrait {
 
 } // namespace
 
-DevicePlaces::DevicePlaces(ComputeContext& context, int particles, const std::vector<int>& mobile,
+DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                            const numerics::Lattice& box, double range, StepSummary& summary)
-    : context(context), summary(summary), numParticles(particles),
+    : context(programs.context()), summary(summary), numParticles(particles),
       numMobile(static_cast<int>(mobile.size())), inCells(range > 0) {
     const int fraction4Size = 4 * (realIsDouble(context) ? sizeof(uint64_t) : sizeof(uint32_t));
     placeArray.initialize(context, std::max(1, numMobile), fraction4Size, "psePlaces");
     slotAt.initialize<int>(context, std::max(1, numMobile), "pseSlotAt");
     slotOf.initialize<int>(context, std::max(1, particles), "pseSlotOf");
-    const ComputeProgram program = particleProgram(context);
+    const ComputeProgram program = programs.particles();
     if (!inCells) {
         particleAt.initialize<int>(context, std::max(1, numMobile), "pseParticleAt");
         if (numMobile > 0)

@@ -23,7 +23,7 @@ public:
      * @param range       of the real-space half, for which cells are made (nm); 0 for no cells:
      * particles then stay in their own order
      */
-    DevicePlaces(OpenMM::ComputeContext& context, int particles, const std::vector<int>& mobile,
+    DevicePlaces(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                  const numerics::Lattice& box, double range, StepSummary& summary);
     /** Follow the positions of the Context. */
     void update();

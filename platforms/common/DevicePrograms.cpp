@@ -5,33 +5,49 @@
 
 namespace PSE {
 
-namespace {
-
-/** One program of the texts that all share and its own. */
-OpenMM::ComputeProgram compile(OpenMM::ComputeContext& context, const std::string& name,
-                               const std::string& source, Defines defines,
-                               const PlanConstants& constants = {}) {
+/** The texts that all share, and the program's own. */
+OpenMM::ComputeProgram DevicePrograms::program(const std::string& name, const std::string& source,
+                                               Defines defines, const PlanConstants& constants) {
+    std::string key = name;
+    for (const auto& [define, value] : defines)
+        key += " " + define + "=" + value;
+    if (!device.getIsCPU()) // else one program serves all constants
+        for (const auto& [constant, value] : constants)
+            key += " " + constant + "=" + std::to_string(value);
+    OpenMM::ComputeProgram& made = programs[key];
     defines["GROUP_SIZE"] = std::to_string(GROUP_SIZE);
-    return compileKernels(context, name,
-                          KernelSources::noiseText + KernelSources::fractions +
-                              KernelSources::reductions + source,
-                          defines, constants);
+    if (!made)
+        made = compileKernels(device, name,
+                              KernelSources::noiseText + KernelSources::fractions +
+                                  KernelSources::reductions + source,
+                              defines, constants);
+    return made;
 }
 
-} // namespace
-
-OpenMM::ComputeProgram particleProgram(OpenMM::ComputeContext& context) {
-    return compile(context, "particles", KernelSources::particles, {});
+OpenMM::ComputeProgram DevicePrograms::particles() {
+    return program("particles", KernelSources::particles, {}, {});
 }
 
-OpenMM::ComputeProgram realSpaceProgram(OpenMM::ComputeContext& context, const Defines& defines,
-                                        const PlanConstants& constants) {
-    return compile(context, "realSpace", KernelSources::realSpace, defines, constants);
+OpenMM::ComputeProgram DevicePrograms::realSpace(const Defines& defines,
+                                                 const PlanConstants& constants) {
+    return program("realSpace", KernelSources::realSpace, defines, constants);
 }
 
-OpenMM::ComputeProgram waveSpaceProgram(OpenMM::ComputeContext& context,
-                                        const PlanConstants& constants) {
-    return compile(context, "waveSpace", KernelSources::waveSpace, {}, constants);
+OpenMM::ComputeProgram DevicePrograms::waveSpace(const PlanConstants& constants) {
+    return program("waveSpace", KernelSources::waveSpace, {}, constants);
+}
+
+OpenMM::FFT3D DevicePrograms::transform(const std::array<int, 3>& grid) {
+    if (!lastTransform || gridOfTransform != grid) {
+        lastTransform = device.createFFT(grid[0], grid[1], grid[2], true);
+        gridOfTransform = grid;
+    }
+    return lastTransform;
+}
+
+void DevicePrograms::clear() {
+    programs.clear();
+    lastTransform.reset();
 }
 
 void uploadConstants(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,

@@ -47,9 +47,10 @@ double DeviceRealSpace::bytesPerParticle(int realSize) {
     return 14.0 * 4 * realSize + 64;
 }
 
-DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, const Lattice& box,
+DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
                                  DevicePlaces& places, StepSummary& summary)
-    : context(context), places(places), summary(summary), lanczosTolerance(plan.lanczosTolerance),
+    : context(programs.context()), places(places), summary(summary),
+      lanczosTolerance(plan.lanczosTolerance),
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
       negativeTolerance(std::max(2 * plan.predictedError, 1e-10)), sumImages(plan.sumImages) {
     const int n = places.count();
@@ -80,7 +81,7 @@ DeviceRealSpace::DeviceRealSpace(ComputeContext& context, const Plan& plan, cons
         defines["SUM_IMAGES"] = "1";
     else if (v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0)
         defines["TILTED"] = "1";
-    const ComputeProgram program = realSpaceProgram(context, defines, constants);
+    const ComputeProgram program = programs.realSpace(defines, constants);
     findKernel = DeviceKernel(context, program, "findNeighbours");
     multiplyReal = DeviceKernel(context, program, "multiplyReal");
     drawNoise = DeviceKernel(context, program, "drawNoise");
@@ -123,13 +124,13 @@ void DeviceRealSpace::prepareGeometry(const Plan& plan, const Lattice& box) {
 void DeviceRealSpace::findNeighbours() {
     const int n = places.count();
     const int entry = sumImages ? sizeof(mm_int2) : sizeof(int);
-    reserve(neighbours, context, size_t(capacity) * n, entry, "pseNeighbours");
+    neighbours.reserve(context, size_t(capacity) * n, entry, "pseNeighbours");
     if (sumImages)
-        findKernel(n, n, capacity, numImages, places.places(), images, geometry, neighbours, counts,
-                   summary.maxima());
+        findKernel(n, n, capacity, numImages, places.places(), images, geometry, *neighbours,
+                   counts, summary.maxima());
     else
         findKernel(n, n, capacity, places.cells(), places.places(), places.cellStarts(), geometry,
-                   neighbours, counts, summary.maxima());
+                   *neighbours, counts, summary.maxima());
 }
 
 bool DeviceRealSpace::hadRoom() {
@@ -145,10 +146,10 @@ template <class... Arguments>
 void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments) {
     const int n = places.count();
     if (sumImages)
-        kernel(n, n, planConstants, places.places(), images, neighbours, counts, geometry, tables,
+        kernel(n, n, planConstants, places.places(), images, *neighbours, counts, geometry, tables,
                arguments...);
     else
-        kernel(n, n, planConstants, places.places(), neighbours, counts, geometry, tables,
+        kernel(n, n, planConstants, places.places(), *neighbours, counts, geometry, tables,
                arguments...);
 }
 
@@ -160,9 +161,9 @@ int DeviceRealSpace::startSquareRoot(const NoiseKey& key) {
     noise = key;
     done = 0;
     const int expected = iterations > 0 ? iterations : FIRST_ITERATIONS;
-    reserve(basis, context, size_t(expected + 1) * places.count(), 4 * realSize(context),
-            "pseBasis");
-    drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), basis,
+    basis.reserve(context, size_t(expected + 1) * places.count(), 4 * realSize(context),
+                  "pseBasis");
+    drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), *basis,
               summary.partialSums());
     iterate(0, expected);
     return 2 * expected + 1;
@@ -170,8 +171,8 @@ int DeviceRealSpace::startSquareRoot(const NoiseKey& key) {
 
 void DeviceRealSpace::iterate(int from, int to) {
     for (int i = from; i < to; i++) {
-        withMatrix(expandBasis, i, basis, summary.partialSums());
-        makeOrthogonal(places.count(), places.count(), i, basis, summary.partialSums());
+        withMatrix(expandBasis, i, *basis, summary.partialSums());
+        makeOrthogonal(places.count(), places.count(), i, *basis, summary.partialSums());
     }
     done = to;
 }
@@ -183,7 +184,7 @@ void DeviceRealSpace::addSquareRoot(double amplitude, ComputeArray& u) {
         const int i = small.iterations();
         if (i == done) {
             const size_t needed = size_t(done + 2) * places.count();
-            if (basis.getSize() < needed) { // more room loses what there is: the same once more
+            if (basis.size() < needed) { // more room loses what there is: the same once more
                 iterations = std::min(done + 1 + done / 2, LanczosTridiagonal::MAX_ITERATIONS);
                 startSquareRoot(noise);
             } else
@@ -199,7 +200,7 @@ void DeviceRealSpace::addSquareRoot(double amplitude, ComputeArray& u) {
     for (int i = 0; i < iterations; i++)
         weights[i] = amplitude * norm(0) * small.coefficients()[i] / norm(i);
     coefficients.upload(weights, true);
-    combineBasis(places.count(), places.count(), iterations, basis, coefficients, u);
+    combineBasis(places.count(), places.count(), iterations, *basis, coefficients, u);
 }
 
 } // namespace PSE

@@ -16,7 +16,7 @@ namespace PSE {
  */
 class DeviceRealSpace {
 public:
-    DeviceRealSpace(OpenMM::ComputeContext& context, const numerics::Plan& plan,
+    DeviceRealSpace(DevicePrograms& programs, const numerics::Plan& plan,
                     const numerics::Lattice& box, DevicePlaces& places, StepSummary& summary);
     /** Rows of the StepSummary's sums that the Lanczos process may use. */
     static int summaryRows();
@@ -54,8 +54,8 @@ private:
     double lanczosTolerance, negativeTolerance;
     bool sumImages;
     int numImages = 0, capacity;
-    OpenMM::ComputeArray planConstants, geometry, tables, images, neighbours, counts, basis,
-        coefficients;
+    OpenMM::ComputeArray planConstants, geometry, tables, images, counts, coefficients;
+    GrowingArray neighbours, basis;
     DeviceKernel findKernel, multiplyReal, drawNoise, expandBasis, makeOrthogonal, combineBasis;
     numerics::NoiseKey noise = {};
     int iterations = 0; ///< of the last square root

@@ -26,10 +26,11 @@ size_t numModes(const mm_int4& size) {
 
 } // namespace
 
-DeviceWaveSpace::DeviceWaveSpace(ComputeContext& context, const Plan& plan, const Lattice& box,
+DeviceWaveSpace::DeviceWaveSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
                                  DevicePlaces& places)
-    : context(context), places(places), size(plan.grid[0], plan.grid[1], plan.grid[2], 0),
-      support(plan.windowSupport), lanes(lanesFor(plan.windowSupport)) {
+    : context(programs.context()), places(places),
+      size(plan.grid[0], plan.grid[1], plan.grid[2], 0), support(plan.windowSupport),
+      lanes(lanesFor(plan.windowSupport)) {
     const int n = places.count();
     const std::vector<Polynomial> pieces =
         Window(support, plan.windowShape).polynomials(plan.windowError);
@@ -46,12 +47,12 @@ DeviceWaveSpace::DeviceWaveSpace(ComputeContext& context, const Plan& plan, cons
         grids[c].initialize(context, 2 * numModes(size), realSize(context), "pseGrid");
         modes[c].initialize(context, numModes(size), 2 * realSize(context), "pseModes");
     }
-    fft = context.createFFT(size.x, size.y, size.z, true);
+    fft = programs.transform(plan.grid);
     prepareFactors(plan, box);
     const PlanConstants constants = {
         {"SUPPORT", support}, {"WINDOW_DEGREE", degree}, {"LANES", lanes}};
     uploadConstants(planConstants, context, constants);
-    const ComputeProgram program = waveSpaceProgram(context, constants);
+    const ComputeProgram program = programs.waveSpace(constants);
     windowKernel = DeviceKernel(context, program, "evaluateWindows");
     spreadForces = DeviceKernel(context, program, "spreadForces");
     scaleWaves = DeviceKernel(context, program, "scaleWaves");

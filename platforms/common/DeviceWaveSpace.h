@@ -6,7 +6,6 @@
 #include "DevicePlaces.h"
 #include "numerics/Noise.h"
 #include "numerics/Plan.h"
-#include "openmm/common/FFT3D.h"
 
 namespace PSE {
 
@@ -17,7 +16,7 @@ namespace PSE {
  */
 class DeviceWaveSpace {
 public:
-    DeviceWaveSpace(OpenMM::ComputeContext& context, const numerics::Plan& plan,
+    DeviceWaveSpace(DevicePrograms& programs, const numerics::Plan& plan,
                     const numerics::Lattice& box, DevicePlaces& places);
     /** Bytes of reals of one size for each grid point, and for each particle. */
     static double bytesPerGridPoint(const numerics::Plan& plan, int realSize);

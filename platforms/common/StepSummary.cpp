@@ -5,14 +5,14 @@
 
 namespace PSE {
 
-StepSummary::StepSummary(OpenMM::ComputeContext& context, int particles, int sums)
-    : context(context), particles(particles), groups(groupsFor(context, particles)) {
+StepSummary::StepSummary(DevicePrograms& programs, int particles, int sums)
+    : context(programs.context()), particles(particles), groups(groupsFor(context, particles)) {
     largest.initialize(context, NUM_MAXIMA * groups, realSize(context), "pseLargest");
     partial.initialize(context, std::max(1, sums * groups), mixedSize(context), "psePartialSums");
     summary.initialize(context, NUM_MAXIMA + sums, mixedSize(context), "pseSummary");
     context.clearBuffer(largest);
     context.clearBuffer(partial);
-    summarise = DeviceKernel(context, particleProgram(context), "summarise");
+    summarise = DeviceKernel(context, programs.particles(), "summarise");
 }
 
 void StepSummary::read(int sums) {

@@ -3,6 +3,7 @@
 #define OPENMMPSE_STEPSUMMARY_H_
 
 #include "DeviceArrays.h"
+#include "DevicePrograms.h"
 
 namespace PSE {
 
@@ -16,7 +17,7 @@ public:
     enum Maximum { Force, Velocity, Neighbours, Unsorted, NUM_MAXIMA };
 
     /** @param sums  rows of sums that there is room for */
-    StepSummary(OpenMM::ComputeContext& context, int particles, int sums);
+    StepSummary(DevicePrograms& programs, int particles, int sums);
     /** [NUM_MAXIMA][groups] reals, for kernels to write */
     OpenMM::ComputeArray& maxima() { return largest; }
     /** [sums][groups] mixed numbers, for kernels to write and read */
