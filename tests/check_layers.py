@@ -58,8 +58,6 @@ ALLOWED = {
     "platforms/cuda": [OPENMM_PUBLIC, r"openmm/cuda/\w+\.h", OWN_API, COMMON],
     "python": [OPENMM, r"OpenMM(Amoeba|Drude)\.h", OWN_API, r"Python\.h", r"bindingSupport\.h"],
 }
-# layers that a checkout may lack
-OPTIONAL = ("platforms/common", "platforms/opencl", "platforms/cuda")
 INCLUDE = re.compile(r'^\s*#\s*include\s*(?:<([^>]+)>|"([^"]+)")', re.MULTILINE)
 
 
@@ -92,8 +90,7 @@ def isAllowed(folder, name):
 
 def violations():
     """One line for every include that the table forbids, and for every layer without sources."""
-    layers = [folder for folder in ALLOWED if folder not in OPTIONAL or (ROOT / folder).exists()]
-    found = [f"{folder} has no sources" for folder in layers if not sources(folder)]
+    found = [f"{folder} has no sources" for folder in ALLOWED if not sources(folder)]
     for folder in ALLOWED:
         for path in sources(folder):
             for match in INCLUDE.finditer(path.read_text(encoding="utf-8")):
