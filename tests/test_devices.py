@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""What can only go wrong on a device: sorting, rows that grow, positions and refusals that the host does not see."""
+import numpy as np
+import openmm
+import pytest
+
+import openmmpse
+from platformnames import contextOn
+from scenes import (ETA, Scene, constantForces, cube, makeContext, makeSystem, positionsOf, randomForces,
+                    randomSuspension)
+
+pytestmark = [pytest.mark.deviceOnly, pytest.mark.onePrecision]
+L, RADIUS = 40.0, 0.5
+ROUNDING = 2e-6  # of both platforms in single precision, at positions rounded to floats
+LOOSE = 1e-2     # tolerance: cheap grids
+
+
+def clustered(N, few):
+    """Particles on the right of the box but for a few, whose cells come before those of all others."""
+    x = np.random.default_rng(0).random((N, 3))*L
+    x[:, 0] = 0.7*L + 0.3*x[:, 0]
+    x[:few, 0] = 1e-3
+    return Scene(x.astype(np.float32).astype(float), cube(L), RADIUS)
+
+
+def difference(scene, platformName, **options):
+    """Relative difference of M f and of a draw of displacements from those of the CPU with the same Plan."""
+    context, integrator = makeContext(scene, platformName, temperature=300.0, tolerance=LOOSE, **options)
+    plan = integrator.getNumericalParameters()
+    other, reference = makeContext(scene, "CPU", temperature=300.0, tolerance=LOOSE,
+                                   configure=lambda cpu: cpu.setNumericalParameters(plan), **options)
+    forces = randomForces(scene)
+    pairs = ((integrator.applyMobility(forces), reference.applyMobility(forces)),
+             (integrator.sampleBrownianDisplacements(1), reference.sampleBrownianDisplacements(1)))
+    return [np.linalg.norm(a - b)/np.linalg.norm(b) for a, b in pairs]
+
+
+@pytest.mark.parametrize("N", [100, 1100])  # OpenMM sorts up to 1024 keys in another way
+def testClusteredParticlesAreSorted(platformName, N):
+    assert max(difference(clustered(N, 5), platformName)) < ROUNDING
+
+
+def testParticlesThatDoNotMoveAreNotSorted(platformName):
+    scene = clustered(1100, 5)
+    masses = np.where(np.arange(1100) % 11 == 0, 100.0, 0.0)
+    assert max(difference(scene, platformName, masses=masses)) < ROUNDING
+
+
+def testRowsOfNeighboursGrow(platformName):
+    # 150 particles within a few radii in a box for which the mean density promises no neighbours
+    x = L/2 + 1.0*np.random.default_rng(1).normal(size=(150, 3))
+    scene = Scene(x.astype(np.float32).astype(float), cube(L), RADIUS)
+    mobility, _ = difference(scene, platformName)
+    assert mobility < ROUNDING
+
+
+def testTooLongAStepNamesItsParticle(platformName):
+    scene = randomSuspension(10, 0.1, cube(1.0), RADIUS, seed=3)
+    forces = np.zeros((10, 3))
+    forces[7, 1] = 1e6
+
+    def drainFreely(integrator):
+        integrator.setMobilityModel(openmmpse.PSEBrownianIntegrator.FreeDraining)
+
+    context, integrator = makeContext(scene, platformName, stepSize=1e40, forces=[constantForces(forces)],
+                                      configure=drainFreely)
+    before = positionsOf(context)
+    with pytest.raises(openmm.OpenMMException, match="position of particle 7"):
+        integrator.step(1)
+    assert np.array_equal(positionsOf(context), before)
+    assert context.getStepCount() == 0
+
+
+def testPositionsOfAnotherIntegratorAreChecked(platformName):
+    scene = randomSuspension(10, 0.1, cube(1.0), RADIUS, seed=3)
+    ours = openmmpse.PSEBrownianIntegrator(0.0, ETA, RADIUS, 1.0)
+    ours.setFluidBoundary(openmmpse.PSEBrownianIntegrator.Periodic)
+    other = openmm.CustomIntegrator(1.0)
+    other.addGlobalVariable("bad", np.nan)
+    other.addComputePerDof("x", "x+bad")
+    both = openmm.CompoundIntegrator()
+    both.addIntegrator(ours)
+    both.addIntegrator(other)
+    context = contextOn(platformName, makeSystem(scene), both)
+    context.setPositions(scene.positions)
+    both.step(1)
+    both.setCurrentIntegrator(1)
+    both.step(1)
+    both.setCurrentIntegrator(0)
+    with pytest.raises(openmm.OpenMMException, match="position of particle 0 is .*not finite"):
+        both.step(1)
+
+
+def testABoxThatChangesNeedsNoNewProgram(platformName, monkeypatch, tmp_path):
+    scene = randomSuspension(40, 0.1, cube(1.0), RADIUS, seed=4)
+    context, integrator = makeContext(scene, platformName, tolerance=LOOSE)
+    integrator.step(1)
+    monkeypatch.setenv("OPENMMPSE_KERNEL_DUMP", str(tmp_path))
+    context.setPeriodicBoxVectors(*(1.02*scene.box))
+    integrator.step(1)
+    assert integrator.getNumericalParameters()["gridDimensions"] != (0, 0, 0)
+    assert list(tmp_path.glob("particles*")) == []
