@@ -81,7 +81,7 @@ def timeStepError(scene):
     fixed random forces (the change of M alone). None at temperature 0 without forces.
     """
     tolerance = PROBE_TOLERANCE if scene.count <= LARGE else PROBE_TOLERANCE_LARGE
-    probe = scene.probe(tolerance)
+    probe = scene.probe(tolerance, exact=True)
     fixed = np.random.default_rng(5).normal(size=scene.positions.shape)
     start = [probe.velocities(probe.forces()), probe.velocities(fixed)]
     drift = 0.5 * scene.stepSize * start[0]

@@ -45,6 +45,8 @@ class Scene:
         self.mobile = np.array([system.getParticleMass(i)._value > 0 for i in range(system.getNumParticles())])
         self.system, self.timingGroup = _prepared(system, self.box, self.mobile)
         self.platform, self.properties = _platform(platform), dict(properties or {})
+        choosable = openmm.Platform.getPlatform(self.platform).getPropertyNames()
+        self._double = {"Precision": "double"} if "Precision" in choosable else {}
         self._template = _template(integrator)
         #: numerical parameters that the user's integrator prescribes; measurements leave them automatic
         self.prescribed = _prescribed(self._template)
@@ -96,9 +98,10 @@ class Scene:
         viscosity = self._template.getViscosity().value_in_unit(VISCOSITY_UNIT)
         return 1 / (6 * np.pi * viscosity * self.radius)
 
-    def probe(self, tolerance, split="automatic", thermal=True, parameters=None):
+    def probe(self, tolerance, split="automatic", thermal=True, parameters=None, exact=False):
         """A `Probe` of this scene; numerical parameters are automatic but for those in a dict `parameters`.
 
+        exact  in double precision, where the platform has a choice: to compare others with
         Raises openmm.OpenMMException for what the library refuses.
         """
         integrator = copy.copy(self._template)
@@ -108,7 +111,7 @@ class Scene:
             integrator.setNumericalParameters(parameters)
         if not thermal:
             integrator.setTemperature(0)
-        return Probe(self, integrator)
+        return Probe(self, integrator, {**self.properties, **(self._double if exact else {})})
 
     def _check(self):
         if self.count == 0:
@@ -131,10 +134,10 @@ class Scene:
 class Probe:
     """One Context of a scene."""
 
-    def __init__(self, scene, integrator):
+    def __init__(self, scene, integrator, properties):
         self.scene, self.integrator = scene, integrator
         platform = openmm.Platform.getPlatform(scene.platform)
-        self.context = openmm.Context(scene.system, integrator, platform, scene.properties)
+        self.context = openmm.Context(scene.system, integrator, platform, properties)
         self.place(scene.positions)
         self._warm = False
         self._groups = integrator.getIntegrationForceGroups()

@@ -132,7 +132,7 @@ class Sweep:
         tight = None
         while tight is None:
             try:
-                tight = self.scene.probe(tolerance, thermal=False)
+                tight = self.scene.probe(tolerance, thermal=False, exact=True)
             except openmm.OpenMMException as error:
                 tolerance *= 10
                 if tolerance > 1.1e-3:

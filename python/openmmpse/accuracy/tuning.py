@@ -68,7 +68,7 @@ def tune(source, positions=None, integrator=None, *, box=None, platform=None, pr
     used = automatic.parameters
     forces = np.random.default_rng(11).normal(size=scene.positions.shape)
     forces[~scene.mobile] = 0
-    exact = scene.probe(max(1e-10, 1e-2 * tolerance), thermal=False).velocities(forces)
+    exact = scene.probe(max(1e-10, 1e-2 * tolerance), thermal=False, exact=True).velocities(forces)
     scale = max(np.linalg.norm(exact), scene.freeMobility * np.linalg.norm(forces[scene.mobile]))
     tuning = Tuning(tolerance, [])
     running = []
