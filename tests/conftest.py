@@ -72,7 +72,7 @@ def pytest_collection_modifyitems(config, items):
     if nowhere:
         items[:] = [item for item in items if item not in nowhere]
         config.hook.pytest_deselected(items=nowhere)
-    # What compiles recorded programs comes after all that records some.
+    # What compiles recorded programs comes after all that records some (in one process).
     items.sort(key=lambda item: item.path.name == "test_cuda_kernels.py")
 
 
