@@ -4,7 +4,6 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
-#include <algorithm>
 #include <limits>
 #include <sstream>
 
@@ -147,9 +146,7 @@ bool PlannedStepKernel::followBox() {
 double PlannedStepKernel::farthestPosition() const {
     if (!request)
         return std::numeric_limits<double>::max();
-    OmmVec3 box[3];
-    boxVectors(box);
-    return FARTHEST * std::max({box[0][0], box[1][1], box[2][2]});
+    return FARTHEST * currentBox().vectors().diagonal().maxCoeff();
 }
 
 Thermal PlannedStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sample) const {

@@ -73,7 +73,10 @@ protected:
     bool followBox();
     /** The noise of the next step, or of the next sample. */
     Thermal thermal(const PSEBrownianIntegrator& integrator, bool sample) const;
-    /** Largest coordinate (nm) that still tells a place in the box. */
+    /**
+     * Largest coordinate (nm) that still tells a place in the box.
+     * @throws OpenMMException naming a box that is not one, before positions are blamed for it
+     */
     double farthestPosition() const;
 
     Scene scene;

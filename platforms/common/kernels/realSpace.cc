@@ -33,16 +33,27 @@ DEVICE real lengthSquared(real4 d) {
     return d.x*d.x+d.y*d.y+d.z*d.z;
 }
 
+/**
+ * Rows of neighbours, [k][i]: from the cells around each particle, or with SUM_IMAGES every image of
+ * every pair in range (few particles, or a range never chosen automatically).
+ * @param counts   neighbours kept, at most `capacity`
+ * @param largest  per group, the most neighbours that a particle has
+ */
+KERNEL void findNeighbours(int n, int capacity,
 #ifdef SUM_IMAGES
-/** Every image of every pair in range: few particles, or a range never chosen automatically. */
-KERNEL void findNeighbours(int n, int capacity, int numImages, GLOBAL const fraction4* RESTRICT places,
-        GLOBAL const real4* RESTRICT images, GLOBAL const real* RESTRICT geometry,
-        GLOBAL int2* RESTRICT neighbours, GLOBAL int* RESTRICT counts, GLOBAL real* RESTRICT largest) {
+        int numImages, GLOBAL const fraction4* RESTRICT places, GLOBAL const real4* RESTRICT images,
+        GLOBAL const real* RESTRICT geometry, GLOBAL int2* RESTRICT neighbours,
+#else
+        int4 cells, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT cellStart,
+        GLOBAL const real* RESTRICT geometry, GLOBAL int* RESTRICT neighbours,
+#endif
+        GLOBAL int* RESTRICT counts, GLOBAL real* RESTRICT largest) {
     LOCAL real buffer[GROUP_SIZE];
     real most = 0;
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         const fraction4 own = places[i];
         int found = 0;
+#ifdef SUM_IMAGES
         for (int j = 0; j < n; j++) {
             const real4 d = displacement(own, places[j], geometry);
             for (int m = 0; m < numImages; m++) {
@@ -55,31 +66,11 @@ KERNEL void findNeighbours(int n, int capacity, int numImages, GLOBAL const frac
                 }
             }
         }
-        counts[i] = found < capacity ? found : capacity;
-        most = larger(most, (real) found);
-    }
-    most = largestInGroup(buffer, most);
-    if (LOCAL_ID == 0)
-        largest[MOST_NEIGHBOURS*NUM_GROUPS+GROUP_ID] = most;
-}
 #else
-/**
- * Rows of neighbours from the cells around each particle, [k][i].
- * @param counts   neighbours kept, at most `capacity`
- * @param largest  per group, the most neighbours that a particle has
- */
-KERNEL void findNeighbours(int n, int capacity, int4 cells, GLOBAL const fraction4* RESTRICT places,
-        GLOBAL const int* RESTRICT cellStart, GLOBAL const real* RESTRICT geometry,
-        GLOBAL int* RESTRICT neighbours, GLOBAL int* RESTRICT counts, GLOBAL real* RESTRICT largest) {
-    LOCAL real buffer[GROUP_SIZE];
-    real most = 0;
-    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
-        const fraction4 own = places[i];
         const real x = fromFraction(own.x), y = fromFraction(own.y), z = fromFraction(own.z);
         const int2 alongX = cellInterval(x-geometry[REACH], x+geometry[REACH], cells.x);
         const int2 alongY = cellInterval(y-geometry[REACH+1], y+geometry[REACH+1], cells.y);
         const int2 alongZ = cellInterval(z-geometry[REACH+2], z+geometry[REACH+2], cells.z);
-        int found = 0;
         for (int column = 0; column < 2*alongX.y*alongY.y; column++) {
             const int cx = wrapped(alongX.x+column/(2*alongY.y), cells.x);
             const int cy = wrapped(alongY.x+column/2%alongY.y, cells.y);
@@ -91,6 +82,7 @@ KERNEL void findNeighbours(int n, int capacity, int4 cells, GLOBAL const fractio
                     found++;
                 }
         }
+#endif
         counts[i] = found < capacity ? found : capacity;
         most = larger(most, (real) found);
     }
@@ -98,7 +90,6 @@ KERNEL void findNeighbours(int n, int capacity, int4 cells, GLOBAL const fractio
     if (LOCAL_ID == 0)
         largest[MOST_NEIGHBOURS*NUM_GROUPS+GROUP_ID] = most;
 }
-#endif
 
 DEVICE real polynomial(GLOBAL const real* RESTRICT coefficients, int degree, real t) {
     real sum = coefficients[0];
