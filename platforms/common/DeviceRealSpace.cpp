@@ -52,7 +52,8 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
     : context(programs.context()), places(places), summary(summary),
       lanczosTolerance(plan.lanczosTolerance),
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-      negativeTolerance(std::max(2 * plan.predictedError, 1e-10)), sumImages(plan.sumImages) {
+      negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
+      reorthogonalise(realIsDouble(this->context)), sumImages(plan.sumImages) {
     const int n = places.count();
     const double mean = meanNeighbours(box, n, plan.realCutoff);
     capacity = static_cast<int>(std::min(ROOM * mean + LEAST_ROOM, 1e9));
@@ -68,7 +69,8 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
     const PlanConstants constants = {{"DEGREE_F", table.F.degree()},
                                      {"DEGREE_C", table.C.degree()}};
     uploadConstants(planConstants, context, constants);
-    Defines defines = {{"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
+    Defines defines = {{"MOST_VECTORS", std::to_string(LanczosTridiagonal::MAX_ITERATIONS)},
+                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
                        {"CONTACT", context.doubleToString(c::CONTACT)},
                        {"APART_F1", context.doubleToString(c::APART_F1)},
                        {"APART_F3", context.doubleToString(c::APART_F3)},
@@ -87,7 +89,12 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
     drawNoise = DeviceKernel(context, program, "drawNoise");
     expandBasis = DeviceKernel(context, program, "expandBasis");
     makeOrthogonal = DeviceKernel(context, program, "makeOrthogonal");
+    findOverlaps = DeviceKernel(context, program, "findOverlaps");
+    removeOverlaps = DeviceKernel(context, program, "removeOverlaps");
     combineBasis = DeviceKernel(context, program, "combineBasis");
+    if (reorthogonalise)
+        overlaps.initialize(context, LanczosTridiagonal::MAX_ITERATIONS * groupsFor(context, n),
+                            mixedSize(context), "pseOverlaps");
     coefficients.initialize(context, LanczosTridiagonal::MAX_ITERATIONS, realSize(context),
                             "pseCoefficients");
 }
@@ -172,7 +179,12 @@ int DeviceRealSpace::startSquareRoot(const NoiseKey& key) {
 void DeviceRealSpace::iterate(int from, int to) {
     for (int i = from; i < to; i++) {
         withMatrix(expandBasis, i, *basis, summary.partialSums());
-        makeOrthogonal(places.count(), places.count(), i, *basis, summary.partialSums());
+        const int n = places.count();
+        makeOrthogonal(n, n, i, *basis, summary.partialSums());
+        if (reorthogonalise) {
+            findOverlaps(n, n, i, *basis, overlaps);
+            removeOverlaps(n, n, i, *basis, overlaps, summary.partialSums());
+        }
     }
     done = to;
 }

@@ -52,11 +52,12 @@ private:
     DevicePlaces& places;
     StepSummary& summary;
     double lanczosTolerance, negativeTolerance;
-    bool sumImages;
+    bool reorthogonalise, sumImages;
     int numImages = 0, capacity;
-    OpenMM::ComputeArray planConstants, geometry, tables, images, counts, coefficients;
+    OpenMM::ComputeArray planConstants, geometry, tables, images, counts, coefficients, overlaps;
     GrowingArray neighbours, basis;
-    DeviceKernel findKernel, multiplyReal, drawNoise, expandBasis, makeOrthogonal, combineBasis;
+    DeviceKernel findKernel, multiplyReal, drawNoise, expandBasis, makeOrthogonal, findOverlaps,
+        removeOverlaps, combineBasis;
     numerics::NoiseKey noise = {};
     int iterations = 0; ///< of the last square root
     int done = 0;       ///< of this one so far

@@ -241,6 +241,52 @@ KERNEL void makeOrthogonal(int n, int iteration, GLOBAL real4* RESTRICT basis, G
         partial[2*(iteration+1)*groups+GROUP_ID] = newSquare;
 }
 
+// In double precision every new vector is then made orthogonal to all before it once more: rounding,
+// which lets it lean towards them, else costs iterations, and in the end convergence.
+
+/** v_j . v_{i+1} of all j <= i, per group: overlaps[j][groups] */
+KERNEL void findOverlaps(int n, int iteration, GLOBAL const real4* RESTRICT basis, GLOBAL mixed* RESTRICT overlaps) {
+    LOCAL mixed buffer[GROUP_SIZE];
+    for (int j = 0; j <= iteration; j++) {
+        mixed overlap = 0;
+        for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE)
+            overlap += dotProduct(basis[j*(mm_long) n+i], basis[(iteration+1)*(mm_long) n+i]);
+        overlap = sumInGroup(buffer, overlap);
+        if (LOCAL_ID == 0)
+            overlaps[j*NUM_GROUPS+GROUP_ID] = overlap;
+    }
+}
+
+/** v_{i+1} -= sum over j <= i of v_j (v_j . v_{i+1})/|v_j|^2, and |v_{i+1}|^2 */
+KERNEL void removeOverlaps(int n, int iteration, GLOBAL real4* RESTRICT basis,
+        GLOBAL const mixed* RESTRICT overlaps, GLOBAL mixed* RESTRICT partial) {
+    LOCAL mixed buffer[GROUP_SIZE];
+    LOCAL real factors[MOST_VECTORS];
+    const int groups = NUM_GROUPS;
+    for (int j = 0; j <= iteration; j++) {
+        const mixed square = sumOfGroups(buffer, partial+2*j*groups, groups);
+        const mixed overlap = sumOfGroups(buffer, overlaps+j*groups, groups);
+        if (LOCAL_ID == 0)
+            factors[j] = square > 0 ? (real) (overlap/square) : 0;
+    }
+    SYNC_THREADS;
+    mixed newSquare = 0;
+    for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
+        real4 next = basis[(iteration+1)*(mm_long) n+i];
+        for (int j = iteration; j >= 0; j--) {
+            const real4 v = basis[j*(mm_long) n+i];
+            next.x -= factors[j]*v.x;
+            next.y -= factors[j]*v.y;
+            next.z -= factors[j]*v.z;
+        }
+        basis[(iteration+1)*(mm_long) n+i] = next;
+        newSquare += dotProduct(next, next);
+    }
+    newSquare = sumInGroup(buffer, newSquare);
+    if (LOCAL_ID == 0)
+        partial[2*(iteration+1)*groups+GROUP_ID] = newSquare;
+}
+
 /** u += sum over k of coefficients[k] v_k */
 KERNEL void combineBasis(int n, int count, GLOBAL const real4* RESTRICT basis,
         GLOBAL const real* RESTRICT coefficients, GLOBAL real4* RESTRICT u) {
