@@ -262,6 +262,11 @@ def stored(scene, context):
     return scene if abs(positions - scene.positions).max() < 1e-12 else scene.at(positions)
 
 
+def forcesOf(context):
+    """Forces (N,3) in kJ/(mol nm); devices round what a Force was told to floats, and its result."""
+    return np.array(context.getState(forces=True).getForces(asNumpy=True)._value)
+
+
 def velocitiesOf(context):
     return np.array(context.getState(velocities=True).getVelocities(asNumpy=True)._value)
 

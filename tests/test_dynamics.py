@@ -13,8 +13,8 @@ from openmmpse import PSEBrownianIntegrator
 from platformnames import (contextOn, coordinateRounding, isDevice, isDirect, served,
                            velocityRounding)
 import scenes
-from scenes import (ETA, FALSE_ALARM, KB, Scene, makeContext, positionsOf, randomForces,
-                    velocitiesOf, zScore)
+from scenes import (ETA, FALSE_ALARM, KB, Scene, forcesOf, makeContext, positionsOf,
+                    randomForces, velocitiesOf, zScore)
 
 T = 300.0
 KT = KB*T
@@ -47,13 +47,13 @@ def trajectory(context, integrator, frames, interval=1):
 def testStepIsDtTimesVelocity(platformName, tolerance):
     """x moves by dt M f (to the rounding of x), v = displacement/dt, time and count go on."""
     tolerance = served(platformName, tolerance)
-    # Velocities of a step and of applyMobility are the same to the rounding of their forces.
+    # Velocities of a step and of applyMobility are the same but for rounding.
     places = max(1e-14, 2*coordinateRounding(platformName))
     numbers = 10*velocityRounding(platformName) if isDevice(platformName) else 1e-13
     s = scenes.randomSuspension(12, 0.1, scenes.tilted(1), 0.5, 201)
-    forces = 50*randomForces(s)
     context, integrator = makeContext(s, platformName, 0.0, 0.7, tolerance,
-                                      forces=[scenes.constantForces(forces)])
+                                      forces=[scenes.constantForces(50*randomForces(s))])
+    forces = forcesOf(context)
     for step in range(1, 4):
         start = positionsOf(context)
         u = integrator.applyMobility(forces)
