@@ -2,6 +2,8 @@
 #ifndef OPENMMPSE_NUMERICS_RPY_H_
 #define OPENMMPSE_NUMERICS_RPY_H_
 
+#include <algorithm>
+
 namespace PSE::numerics {
 
 /**
@@ -34,6 +36,28 @@ inline PairScalars rpyScalars(double r) {
         return {1 + c::OVERLAP_F1 * r, 1 + c::OVERLAP_G1 * r};
     const double s = 1 / r;
     return {s * (c::APART_F1 + c::APART_F3 * s * s), s * (c::APART_G1 + c::APART_G3 * s * s)};
+}
+
+/**
+ * The same of two spheres of any radii, apart, overlapping, or one inside the other [T24]. Its
+ * units follow from that of a length: with lengths in a, mobilities are in 1/(6 pi eta a).
+ *
+ * @param r   distance of the centres, >= 0
+ * @param ai  radius of one sphere, > 0; aj  that of the other
+ */
+inline PairScalars rpyScalars(double r, double ai, double aj) {
+    const double sum = ai + aj, difference2 = (ai - aj) * (ai - aj);
+    if (r > sum) {
+        const double s = 1 / r, squares = (ai * ai + aj * aj) * s * s;
+        return {s * (0.75 + 0.25 * squares), s * (1.5 - 0.5 * squares)};
+    }
+    if (r * r <= difference2) {
+        const double larger = 1 / std::max(ai, aj);
+        return {larger, larger};
+    }
+    const double cube = 32 * r * r * r, skew = difference2 + 3 * r * r, gap = difference2 - r * r;
+    const double F = 0.5 * sum - skew * skew / cube, along = 3 * gap * gap / cube;
+    return {F / (ai * aj), (F + along) / (ai * aj)};
 }
 
 } // namespace PSE::numerics
