@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "HostStepKernel.h"
-#include "FreeDrainingEngine.h"
 #include "openmm/internal/ContextImpl.h"
 #include <cmath>
 
@@ -35,7 +34,7 @@ void HostStepKernel::useEngine(const Plan& plan, const Lattice& box) {
 }
 
 void HostStepKernel::useFreeDraining() {
-    engine.reset(new FreeDrainingEngine(viscosity, scene.radii, scene.mobile, clock));
+    engine = factory->createFreeDraining(viscosity, scene.radii, scene.mobile, clock);
 }
 
 string HostStepKernel::precisionName(const Plan& plan) const {

@@ -45,6 +45,11 @@ public:
                                                    const numerics::Lattice& box, double viscosity,
                                                    const std::vector<int>& indices,
                                                    StageClock& clock) const = 0;
+    /** The engine of particles that move each for itself, with these radii. */
+    virtual std::unique_ptr<MobilityEngine> createFreeDraining(double viscosity,
+                                                               const std::vector<double>& radii,
+                                                               const std::vector<int>& indices,
+                                                               StageClock& clock) const = 0;
 };
 
 } // namespace PSE

@@ -2,6 +2,7 @@
 #include "HostStepKernel.h"
 #include "Memory.h"
 #include "ReferenceEngine.h"
+#include "ReferenceFreeDraining.h"
 #include "openmm/KernelFactory.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/windowsExport.h"
@@ -27,6 +28,13 @@ public:
         requireMemory(plan, box, indices.size(), {24, 28});
         return std::unique_ptr<MobilityEngine>(
             new ReferenceEngine(plan, box, viscosity, indices, clock));
+    }
+    std::unique_ptr<MobilityEngine> createFreeDraining(double viscosity,
+                                                       const std::vector<double>& radii,
+                                                       const std::vector<int>& indices,
+                                                       StageClock& clock) const override {
+        return std::unique_ptr<MobilityEngine>(
+            new ReferenceFreeDraining(viscosity, radii, indices, clock));
     }
 };
 

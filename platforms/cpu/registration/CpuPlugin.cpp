@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "CpuEngine.h"
+#include "CpuFreeDraining.h"
 #include "HostStepKernel.h"
 #include "Memory.h"
 #include "openmm/KernelFactory.h"
@@ -29,6 +30,13 @@ public:
         if (plan.precision == numerics::Precision::Single)
             return make<float>(plan, box, viscosity, indices, clock);
         return make<double>(plan, box, viscosity, indices, clock);
+    }
+    std::unique_ptr<MobilityEngine> createFreeDraining(double viscosity,
+                                                       const std::vector<double>& radii,
+                                                       const std::vector<int>& indices,
+                                                       StageClock& clock) const override {
+        return std::unique_ptr<MobilityEngine>(
+            new CpuFreeDraining(viscosity, radii, indices, pool, clock));
     }
 
 private:
