@@ -263,15 +263,21 @@ def everyJob(programs):
 
 
 def coveringJobs(programs):
-    """Each program for one architecture at least, and for all of them if it is the first of its name
-    and precision with a certain line of defines or shape of box. Floating point numbers count as
-    one, for they change no more than a constant."""
-    seen, jobs = set(), []
-    for i, program in enumerate(programs):
-        lines = {program.box, *FLOAT.sub("1.0", program.defines).splitlines()}
-        lines = {(program.name, program.precision, program.source, line) for line in lines}
-        jobs += everyJob([program]) if lines - seen else [(program, ARCHITECTURES[i % len(ARCHITECTURES)])]
-        seen |= lines
+    """
+    The first program of a name, precision and shape of box for every architecture; of the others
+    those with a line of defines that no earlier one had, for one architecture each, in turn.
+    Floating point numbers count as one, for they change no more than a constant.
+    """
+    seen, jobs, single = set(), [], 0
+    for program in programs:
+        kind = (program.name, program.precision, program.source)
+        lines = {(kind, line) for line in FLOAT.sub("1.0", program.defines).splitlines()}
+        if (kind, program.box) not in seen:
+            jobs += everyJob([program])
+        elif lines - seen:
+            jobs.append((program, ARCHITECTURES[single % len(ARCHITECTURES)]))
+            single += 1
+        seen |= {(kind, program.box)} | lines
     return jobs
 
 
