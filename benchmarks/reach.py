@@ -33,19 +33,20 @@ PROGRAM = Path(__file__).resolve().parents[1]/"build"/"venv"/"bench_stages"
 
 # ---------------------------------------------------------------- scenes
 
-def pse(tolerance):
+def pse(tolerance, model=PSEBrownianIntegrator.RotnePragerYamakawa):
     integrator = PSEBrownianIntegrator(TEMPERATURE, VISCOSITY, RADIUS, STEP)
     integrator.setErrorTolerance(tolerance)
+    integrator.setMobilityModel(model)
     integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
     integrator.setRandomNumberSeed(1)
     return integrator
 
 
 class Contender:
-    """A Context whose steps are timed. `count` particles, `steps` per visit."""
+    """A Context whose steps are timed. `count` particles, `steps` per visit; `model` of the fluid, if there is one."""
 
     def __init__(self, count=SMALL, phi=0.1, tolerance=1e-3, threads=2, repulsion=False, fluid=True, shuffled=True,
-                 steps=None):
+                 steps=None, model=PSEBrownianIntegrator.RotnePragerYamakawa):
         positions, length = lattice(count, phi, shuffled)
         system = makeSystem(count, length, repulsion)
         if repulsion:  # contacts as the dynamics leaves them
@@ -54,7 +55,7 @@ class Contender:
             before.step(50)
             positions = settled.getState(positions=True).getPositions(asNumpy=True)
             del settled
-        integrator = pse(tolerance) if fluid else openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
+        integrator = pse(tolerance, model) if fluid else openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
         self.context = context(system, positions, integrator, threads)
         self.count = count
         self.steps = steps or 10
@@ -116,6 +117,16 @@ def rowStep(options):
         both = [Contender(repulsion=True, fluid=fluid, shuffled=shuffled) for fluid in (True, False)]
         fluid, plain = takeTurns(both, options.rounds)
         results.append(Result(name, ratio, (fluid, plain), f"{fluid} against {plain}"))
+    return results
+
+
+def rowDraining(options):
+    freely = PSEBrownianIntegrator.FreeDraining
+    results = []
+    for repulsion, name in ((False, "draining"), (True, "draining, WCA")):
+        both = [Contender(repulsion=repulsion, fluid=fluid, steps=100, model=freely) for fluid in (True, False)]
+        draining, plain = takeTurns(both, options.rounds)
+        results.append(Result(name, ratio, (draining, plain), f"{draining} against {plain}"))
     return results
 
 
@@ -213,13 +224,15 @@ def rowCreation(options):
     return [Result("creation", lambda seconds: seconds, (fluid,), f"{fluid}, of which OpenMM's own {plain}")]
 
 
-ROWS = {"step": rowStep, "fft": rowFft, "ptps": rowPtps, "large": rowLarge, "phi": rowPhi, "tolerance": rowTolerance,
-        "threads": rowThreads, "memory": rowMemory, "creation": rowCreation}
+ROWS = {"step": rowStep, "draining": rowDraining, "fft": rowFft, "ptps": rowPtps, "large": rowLarge, "phi": rowPhi,
+        "tolerance": rowTolerance, "threads": rowThreads, "memory": rowMemory, "creation": rowCreation}
 NEED_PROGRAM = {"fft", "memory"}
 # name: what, must, aim, whether less is better
 TARGETS = {
     "step": ("step of 16,000 WCA spheres / BrownianIntegrator's", 8, 4, True),
     "step, in order": ("the same, indices in the order of space", 8, 4, True),
+    "draining": ("step with FreeDraining / BrownianIntegrator's", 1.15, 1, True),
+    "draining, WCA": ("the same with a repulsion between the spheres", 1.15, 1, True),
     "fft": ("hydrodynamic part (Hasimoto) / its six 3-D FFTs", 6, 4, True),
     "ptps": ("hydrodynamic part, particle-steps per second", 1e6, 2e6, False),
     "large": ("PTPS at N = 1,000,000 / at 16,000", 0.6, 0.8, False),
