@@ -6,10 +6,16 @@ namespace PSE::numerics {
 
 namespace {
 
-std::vector<double> chebyshevCoefficients(const std::function<double(double)>& f, int n) {
-    std::vector<double> values(n), c(n);
+std::vector<double> valuesAtPoints(const std::function<double(double)>& f, int n) {
+    std::vector<double> values(n);
     for (int j = 0; j < n; j++)
-        values[j] = f(std::cos(M_PI * (j + 0.5) / n));
+        values[j] = f(chebyshevPoint(j, n));
+    return values;
+}
+
+std::vector<double> chebyshevCoefficients(const std::vector<double>& values) {
+    const int n = static_cast<int>(values.size());
+    std::vector<double> c(n);
     for (int k = 0; k < n; k++) {
         double sum = 0;
         for (int j = 0; j < n; j++)
@@ -36,6 +42,10 @@ std::vector<double> toPowers(const std::vector<double>& chebyshev) {
 
 } // namespace
 
+double chebyshevPoint(int j, int n) {
+    return std::cos(M_PI * (j + 0.5) / n);
+}
+
 double Polynomial::operator()(double t) const {
     double b1 = 0, b2 = 0;
     for (int k = degree(); k > 0; k--) {
@@ -48,16 +58,20 @@ double Polynomial::operator()(double t) const {
 
 Polynomial fitPolynomial(const std::function<double(double)>& f, int degree) {
     Polynomial p;
-    p.chebyshev = chebyshevCoefficients(f, degree + 1);
+    p.chebyshev = chebyshevCoefficients(valuesAtPoints(f, degree + 1));
     p.powers = toPowers(p.chebyshev);
     return p;
 }
 
 Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree,
                          int maxDegree) {
+    return fitPolynomial(valuesAtPoints(f, maxDegree + 1), maxError, minDegree);
+}
+
+Polynomial fitPolynomial(const std::vector<double>& values, double maxError, int minDegree) {
     Polynomial p;
-    p.chebyshev = chebyshevCoefficients(f, maxDegree + 1);
-    int degree = maxDegree;
+    p.chebyshev = chebyshevCoefficients(values);
+    int degree = static_cast<int>(values.size()) - 1;
     double neglected = 0;
     while (degree > minDegree && neglected + std::fabs(p.chebyshev[degree]) < maxError)
         neglected += std::fabs(p.chebyshev[degree--]);

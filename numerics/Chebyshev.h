@@ -21,6 +21,9 @@ struct Polynomial {
     double operator()(double t) const;
 };
 
+/** Chebyshev point j of n, in (-1, 1), descending. */
+double chebyshevPoint(int j, int n);
+
 /** Fit by interpolation at degree + 1 Chebyshev points. */
 Polynomial fitPolynomial(const std::function<double(double)>& f, int degree);
 
@@ -30,6 +33,8 @@ Polynomial fitPolynomial(const std::function<double(double)>& f, int degree);
  */
 Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree,
                          int maxDegree);
+/** The same from the values at all chebyshevPoint()s of maxDegree + 1. */
+Polynomial fitPolynomial(const std::vector<double>& values, double maxError, int minDegree);
 
 } // namespace PSE::numerics
 

@@ -5,11 +5,13 @@
 // One tolerance becomes numbers here and nowhere else [T11-T16, T22, T23]. Lengths in nm.
 
 #include "numerics/Lattice.h"
+#include "numerics/Mixture.h"
 #include "numerics/Split.h"
 #include <array>
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace PSE::numerics {
 
@@ -47,27 +49,36 @@ struct PlanRequest {
     SplitChoice split = SplitChoice::Automatic;
     /// the platform has no double precision to resort to: choose what single precision can do
     bool singleOnly = false;
+    /// of each particle; empty if all have `radius`
+    std::vector<double> radii = {};
 };
 
 /** Everything a platform needs to know about the numerics. */
 struct Plan {
-    std::shared_ptr<const Split> split; ///< in reduced units (lengths in a)
-    double a;                           ///< radius
-    std::string splitReason;            ///< why this one, in words
-    double xi;         ///< splitting parameter (1/nm); of the prolate split 1/range
-    double bandwidth;  ///< c of the prolate split, else 0
-    double realCutoff; ///< range of the real half
+    std::shared_ptr<const Split> split; ///< in reduced units (lengths in a); NULL for a mixture
+    /// unequal radii, in units of a; NULL for equal ones
+    std::shared_ptr<const Mixture> mixture;
+    /// radius; of a mixture 1/sqrt(mean of 1/a_i^2), so that unit forces have mobilities of 1
+    double a;
+    std::string splitReason; ///< why this one, in words
+    double xi;               ///< splitting parameter (1/nm); of the prolate split 1/range
+    double bandwidth;        ///< c of the prolate split, else 0
+    double realCutoff;       ///< range of the real half
     /// the range exceeds half the box: sum explicitly over all images
     bool sumImages;
     std::array<int, 3> grid; ///< M_d
     int windowSupport;       ///< P
     double windowShape;      ///< beta
+    /// of a mixture: the window is radial, of diameter P times this length (in units of a); else 0
+    double windowSpacing;
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
     double windowError;      ///< absolute error allowed in the weights of the window
     double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
     Precision precision;
 
+    /** Of the split, whichever there is. */
+    std::string splitName() const { return mixture ? mixture->name() : split->name(); }
     /** Number of grid points; double, because a request may exceed any integer. */
     double gridPoints() const { return double(grid[0]) * grid[1] * grid[2]; }
 };

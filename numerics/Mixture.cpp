@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#include "numerics/Mixture.h"
+#include "numerics/Quadrature.h"
+#include "numerics/SphericalBessel.h"
+#include <algorithm>
+
+namespace PSE::numerics {
+
+Mixture::Mixture(std::shared_ptr<const Envelope> envelope, const std::vector<double>& radii)
+    : H(std::move(envelope)), ofParticles(radii), distinct(radii) {
+    std::sort(distinct.begin(), distinct.end());
+    distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+}
+
+double Mixture::waveWeight(double k, double ai, double aj) const {
+    return envelope(k) * sinc(k * ai) * sinc(k * aj);
+}
+
+MixtureQuadrature::MixtureQuadrature(const Mixture& mixture, double largestDistance) {
+    // The integrand oscillates as cos(k (r + ai + aj)): resolved with half as many nodes as that
+    // has radians, and some more.
+    const double end = mixture.largestWaveNumber();
+    const int n = static_cast<int>(60 + 0.6 * end * (largestDistance + 2 * mixture.radii().back()));
+    const Quadrature rule = gaussLegendre(n, 0, end);
+    k = rule.nodes;
+    for (int i = 0; i < n; i++)
+        w.push_back(3 / M_PI * rule.weights[i] * mixture.envelope(k[i]));
+}
+
+SmoothScalars MixtureQuadrature::operator()(double r, double ai, double aj) const {
+    SmoothScalars sum = {0, 0};
+    for (size_t i = 0; i < k.size(); i++) {
+        const BesselRatios j = besselRatios(k[i] * r);
+        const double weight = w[i] * sinc(k[i] * ai) * sinc(k[i] * aj);
+        sum.F += weight * (j.j0 - j.j1x);
+        sum.C += weight * k[i] * k[i] * j.j2x2;
+    }
+    return sum;
+}
+
+} // namespace PSE::numerics
