@@ -94,9 +94,13 @@ void MixtureTable::chooseNodes(const Mixture& mixture, const MixtureQuadrature& 
         return;
     }
     interpolated = true;
-    for (int n = 2; n <= MOST_BASIS; n++) {
+    const auto suffices = [&](const Basis& basis) {
+        return basis.error(rule, radii.front(), radii.back()) <= INTERPOLATION_SHARE * maxError;
+    };
+    const bool possible = suffices(Basis(radii.front(), radii.back(), MOST_BASIS));
+    for (int n = 2; possible && n <= MOST_BASIS; n++) {
         const Basis basis(radii.front(), radii.back(), n);
-        if (basis.error(rule, radii.front(), radii.back()) <= INTERPOLATION_SHARE * maxError) {
+        if (suffices(basis)) {
             nodes = basis.nodes;
             barycentric = basis.barycentric;
             return;

@@ -24,7 +24,7 @@ public:
     static constexpr int MOST_CLASSES = 8;
 
     /**
-     * @param maxError  absolute error allowed to either scalar (C times rc^2), in units of the
+     * @param maxError  absolute error allowed to F and r^2 C, in units of the
      * mobility of the larger sphere of the pair
      * @throws std::invalid_argument if radii differ too much to be interpolated
      */
@@ -33,7 +33,7 @@ public:
     double rc() const { return range; }
     /** Number of basis functions, at most MOST_BASIS. */
     int size() const { return static_cast<int>(nodes.size()); }
-    static constexpr int MOST_BASIS = 48;
+    static constexpr int MOST_BASIS = 32;
     int degree() const { return functionsF[0].degree(); }
     /** Whether radii between those of the basis are interpolated; else each has its own. */
     bool interpolates() const { return interpolated; }
