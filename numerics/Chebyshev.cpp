@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/Chebyshev.h"
 #include <cmath>
+#include <utility>
 
 namespace PSE::numerics {
 
@@ -56,11 +57,15 @@ double Polynomial::operator()(double t) const {
     return chebyshev[0] + t * b1 - b2;
 }
 
-Polynomial fitPolynomial(const std::function<double(double)>& f, int degree) {
+Polynomial fromChebyshev(std::vector<double> coefficients) {
     Polynomial p;
-    p.chebyshev = chebyshevCoefficients(valuesAtPoints(f, degree + 1));
-    p.powers = toPowers(p.chebyshev);
+    p.powers = toPowers(coefficients);
+    p.chebyshev = std::move(coefficients);
     return p;
+}
+
+Polynomial fitPolynomial(const std::function<double(double)>& f, int degree) {
+    return fromChebyshev(chebyshevCoefficients(valuesAtPoints(f, degree + 1)));
 }
 
 Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError, int minDegree,
@@ -69,15 +74,13 @@ Polynomial fitPolynomial(const std::function<double(double)>& f, double maxError
 }
 
 Polynomial fitPolynomial(const std::vector<double>& values, double maxError, int minDegree) {
-    Polynomial p;
-    p.chebyshev = chebyshevCoefficients(values);
+    std::vector<double> c = chebyshevCoefficients(values);
     int degree = static_cast<int>(values.size()) - 1;
     double neglected = 0;
-    while (degree > minDegree && neglected + std::fabs(p.chebyshev[degree]) < maxError)
-        neglected += std::fabs(p.chebyshev[degree--]);
-    p.chebyshev.resize(degree + 1);
-    p.powers = toPowers(p.chebyshev);
-    return p;
+    while (degree > minDegree && neglected + std::fabs(c[degree]) < maxError)
+        neglected += std::fabs(c[degree--]);
+    c.resize(degree + 1);
+    return fromChebyshev(std::move(c));
 }
 
 } // namespace PSE::numerics

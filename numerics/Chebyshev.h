@@ -24,6 +24,9 @@ struct Polynomial {
 /** Chebyshev point j of n, in (-1, 1), descending. */
 double chebyshevPoint(int j, int n);
 
+/** The polynomial with these coefficients in the Chebyshev basis. */
+Polynomial fromChebyshev(std::vector<double> coefficients);
+
 /** Fit by interpolation at degree + 1 Chebyshev points. */
 Polynomial fitPolynomial(const std::function<double(double)>& f, int degree);
 
