@@ -15,6 +15,14 @@ struct PairScalars {
 };
 
 /**
+ * Scalars of an isotropic pair tensor written F I + C r r^T, r not normalised: C = (G - F)/r^2
+ * stays finite at r = 0.
+ */
+struct SmoothScalars {
+    double F, C;
+};
+
+/**
  * Coefficients of the Rotne-Prager-Yamakawa tensor [T3], for SIMD loops that evaluate many pairs:
  * F = F1/r + F3/r^3 and G likewise where the spheres are apart, F = 1 + F1 r where they overlap.
  */

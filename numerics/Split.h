@@ -22,14 +22,6 @@ namespace PSE::numerics {
 /** Distance of two touching spheres. */
 constexpr double CONTACT = 2;
 
-/**
- * Scalars of an isotropic pair tensor written F I + C r r^T, r not normalised: C = (G - F)/r^2
- * stays finite at r = 0.
- */
-struct SmoothScalars {
-    double F, C;
-};
-
 class Split {
 public:
     virtual ~Split() = default;

@@ -2,6 +2,7 @@
 // RPY, the split and its real-space table, against quadrature by another rule, closed forms and
 // lattice sums.
 
+#include "PairOracle.h"
 #include "numerics/Lattice.h"
 #include "numerics/RealTable.h"
 #include "numerics/HasimotoSplit.h"
@@ -18,29 +19,6 @@ namespace {
 const double XIS[] = {0.05, 0.3, 0.5, 1, 2};
 const double DISTANCES[] = {0, 0.1, 0.5, 1.9, 2, 2.1, 5, 10};
 
-/** j0(x) - j1(x)/x and j2(x)/x^2 in extended precision: Taylor series below 3, closed forms above.
- */
-void besselReference(long double x, long double& transverse, long double& j2x2) {
-    const long double x2 = x * x;
-    if (x < 3) {
-        // j_l(x)/x^l = sum_n (-x^2/2)^n/(n! (2l + 2n + 1)!!)
-        long double j[3] = {0, 0, 0};
-        for (int l = 0; l < 3; l++) {
-            long double term = (l == 0 ? 1.0L : (l == 1 ? 1.0L / 3 : 1.0L / 15));
-            for (int n = 0; n < 40; n++) {
-                j[l] += term;
-                term *= -x2 / 2 / ((n + 1) * (2 * l + 2 * n + 3));
-            }
-        }
-        transverse = j[0] - j[1];
-        j2x2 = j[2];
-        return;
-    }
-    const long double j0 = std::sin(x) / x, j1x = (j0 - std::cos(x)) / x2;
-    transverse = j0 - j1x;
-    j2x2 = (3 * j1x - j0) / x2;
-}
-
 long double hasimotoWeight(long double k, long double xi) {
     const long double sinc = (k == 0 ? 1 : std::sin(k) / k), q = k * k / (4 * xi * xi);
     return sinc * sinc * (1 + q) * std::exp(-q);
@@ -52,17 +30,9 @@ long double hasimotoWeight(long double k, long double xi) {
  * power: error about 1e-18.
  */
 SmoothScalars waveReference(double xi, double r) {
-    const long double pi = std::acos(-1.0L), step = 2 * pi / (r + 2 + 8 / (long double)xi),
-                      last = 14 * (long double)xi;
-    long double F = 0, C = 0;
-    for (int i = 0; i * step < last; i++) {
-        const long double k = i * step, w = (i == 0 ? 0.5L : 1) * hasimotoWeight(k, xi);
-        long double transverse, j2x2;
-        besselReference(k * r, transverse, j2x2);
-        F += w * transverse;
-        C += w * k * k * j2x2;
-    }
-    return {double(3 / pi * step * F), double(3 / pi * step * C)};
+    const long double x = xi;
+    return scalarsByTrapezium([x](long double k) { return hasimotoWeight(k, x); }, 2 + 8 / x,
+                              14 * x, r);
 }
 
 /**
