@@ -10,6 +10,7 @@ from platformnames import DEVICES, NAMES, VARIANTS, absence, familyOf, isDevice,
 
 NOWHERE = pytest.param(None, id="nowhere")
 MARKS = {
+    "onePlatform": "runs on one platform: what it tests is decided before any platform sees it",
     "onePrecision": "runs in one precision of a device: what it tests does not depend on it",
     "hostOnly": "not on devices, where what it tests follows from having the noise of the CPU",
     "deviceOnly": "runs on devices alone",
@@ -46,6 +47,8 @@ def namesFor(chosen, marks):
         names = [name for name in names if isDevice(name)]
     if "withGrid" in marks:
         names = [name for name in names if not isDirect(name)]
+    if "onePlatform" in marks:
+        names = names[:1]
     if "onePrecision" in marks:
         names = [name for i, name in enumerate(names)
                  if familyOf(name) not in map(familyOf, names[:i])]

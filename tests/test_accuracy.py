@@ -75,6 +75,7 @@ def testErrorsAreThoseAgainstTheOracleAndKeepTheTolerance(small, platformName):
         assert result.rows[1].errors[kind] == pytest.approx(scenes.errorOf(integrator, forces, small), rel=1e-5 if lowestTolerance(platformName) < 1e-6 else 1e-3)
 
 
+@pytest.mark.hostOnly
 def testNoiseIsCovarianceErrorPlusTwiceTheLanczosError(small, platformName):
     scene = sceneOf(small, platformName)
     result = accuracy.measure(scene, rounds=1, tolerances=(1e-1, 1e-3))
@@ -309,6 +310,7 @@ def testStagesAreReadFromTheDescription(small, platformName):
 
 # ---------------------------------------------------------------- tuning
 
+@pytest.mark.hostOnly
 def testTuningOffersWhatTheIntegratorAccepts(small, platformName):
     result = accuracy.tune(sceneOf(small, platformName), tolerance=1e-2, rounds=1)
     assert result.automatic.settings == {} and len(result.candidates) + len(result.notes) == 9

@@ -171,6 +171,7 @@ def testUnitsAreConverted():
     assert integrator.getTemperature().value_in_unit(unit.kelvin) == 300
 
 
+@pytest.mark.onePlatform
 @pytest.mark.parametrize("forces", [
     np.zeros((5, 3)), np.zeros((7, 3)), np.zeros((6, 2)), np.zeros(18), np.zeros((1, 6, 3)),
     np.zeros((0, 3)), [], 1.0, [[0, 0, 0]]*5 + [[0, 0]], [["a", "b", "c"]]*6])
@@ -181,6 +182,7 @@ def testShapesOfForces(platformName, forces):
     assertMentions(message, "forces", "(6, 3)")
 
 
+@pytest.mark.onePlatform
 def testForcesOfTheWrongDimension(platformName):
     context, integrator = makeContext(suspension(), platformName)
     forces = np.zeros((6, 3))*unit.nanometer
@@ -201,6 +203,7 @@ def testNonFiniteForcesGiven(platformName):
     assertMentions(message, "particle 4", "nan", "finite")
 
 
+@pytest.mark.onePlatform
 def testNumberOfSamples(platformName):
     context, integrator = makeContext(suspension(), platformName, 300.0)
     assertMentions(messageOf(integrator.sampleBrownianDisplacements, -1), "-1", "negative")
@@ -228,6 +231,7 @@ def testSettingsOfLaterVersions(platformName, configure, words):
     assertMentions(refusal(platformName, configure), "PSEBrownianIntegrator", *words)
 
 
+@pytest.mark.hostOnly
 @pytest.mark.parametrize("parameters, words", [
     ({"xi": 1.0}, ["range of 1 nm", "below", "1.7", "tolerance 0.001", "smaller splitting"]),
     ({"realCutoff": 1.1}, ["range of 1.1 nm", "below", "looser tolerance"]),

@@ -210,7 +210,7 @@ def meanSquareSeparation(platformName, count, k, dt, steps, a):
     return blocks.mean(), blocks.var(ddof=1)/50
 
 
-@pytest.mark.onePrecision
+@pytest.mark.hostOnly
 def testDumbbellExtrapolatesToBoltzmann(platformName):
     """
     Springs of zero length with rms separation 3a, so that overlap, touching and distance all count:

@@ -61,9 +61,9 @@ def suspension(seed=101, N=8, box=scenes.tilted(1)):
     return scenes.randomSuspension(N, 0.15, box, 0.5, seed)
 
 
-@pytest.mark.onePrecision
 # ---------------------------------------------------------------- covariance
 
+@pytest.mark.hostOnly
 @pytest.mark.parametrize("name, xi, split", [
     ("touching", 0, "automatic"), ("overlapping", 0.8, "Hasimoto"), ("overlapping", 2.0, "Hasimoto"),
     ("suspension", 0, "automatic"), ("suspension", 0.7, "Hasimoto"), ("suspension", 1.6, "Hasimoto"),
@@ -75,6 +75,18 @@ def testCovarianceIsThatOfTheMobility(platformName, name, xi, split):
     of 0.1. A correlation between the two halves would add to the covariance, by up to the geometric
     mean of the two halves' variances and differently for each xi, so several xi exclude it, too.
     """
+    checkCovariance(platformName, name, xi, split)
+
+
+@pytest.mark.deviceOnly
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("name", ["touching", "suspension"])
+def testCovarianceOnDevices(platformName, name):
+    """The same, though it follows from having the noise of the CPU."""
+    checkCovariance(platformName, name, 0, "automatic")
+
+
+def checkCovariance(platformName, name, xi, split):
     s = {"touching": lambda: scenes.pair(1.0, 4.0, 0.5),
          "overlapping": lambda: scenes.pair(0.25, 4.0, 0.5),
          "suspension": suspension,
