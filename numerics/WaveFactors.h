@@ -3,6 +3,7 @@
 #define OPENMMPSE_NUMERICS_WAVEFACTORS_H_
 
 #include "numerics/Plan.h"
+#include "numerics/RadialWindow.h"
 #include "numerics/Vec3.h"
 #include <array>
 #include <vector>
@@ -10,8 +11,8 @@
 namespace PSE::numerics {
 
 /**
- * What turns gridded forces into gridded velocities, mode by mode [T4, T10]: the wave factor of the
- * split over the volume, over the square of the window's transform.
+ * What turns gridded forces into gridded velocities, mode by mode [T4, T10, T30]: the wave factor
+ * of the split over the volume, over the square of the window's transform.
  */
 class WaveFactors {
 public:
@@ -28,11 +29,16 @@ public:
     double operator()(int x, int y, int z) const;
 
 private:
+    double ofMixture(double k) const;
+
     std::shared_ptr<const Split> split;
+    std::shared_ptr<const Mixture> mixture;
     std::array<int, 3> grid;
     Matrix3 waveVectors;
     double unit;
-    std::vector<double> inverse[3]; ///< 1/W^ along each axis
+    std::vector<double> inverse[3];   ///< 1/W^ along each axis, for equal spheres
+    std::vector<RadialWindow> radial; ///< that of a mixture, else none
+    double cell = 0;                  ///< volume per grid point
 };
 
 } // namespace PSE::numerics

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 // The CPU engine on every instruction set that this machine has, and for any number of threads.
 #include "CpuEngine.h"
+#include "EngineScenes.h"
 #include "ParticleOrder.h"
 #include "WaveKernels.h"
 #include "numerics/Plan.h"
 #include "numerics/RealTable.h"
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <memory>
 #include <random>
 
 using namespace PSE;
 using namespace PSE::numerics;
+using namespace engineScenes;
 
 namespace {
 
@@ -89,37 +90,6 @@ std::vector<Vec3> velocities(const EngineScene& scene, int threads, Precision pr
     engine->setPositions(scene.positions);
     engine->computeVelocities(&scene.forces, &thermal, u);
     return u;
-}
-
-double norm(const std::vector<Vec3>& u) {
-    double sum = 0;
-    for (const Vec3& v : u)
-        sum += v.squaredNorm();
-    return std::sqrt(sum);
-}
-
-double distance(std::vector<Vec3> u, const std::vector<Vec3>& v) {
-    for (size_t i = 0; i < u.size(); i++)
-        u[i] -= v[i];
-    return norm(u);
-}
-
-/** Restores what Highway would have chosen by itself. */
-struct ChosenTarget {
-    explicit ChosenTarget(int64_t target) { choose(target); }
-    ~ChosenTarget() { choose(0); }
-    static void choose(int64_t target) {
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    }
-};
-
-/** The single targets among those that this machine can run. */
-std::vector<int64_t> runnableTargets() {
-    std::vector<int64_t> targets;
-    for (int64_t all = hwy::SupportedTargets(); all != 0; all &= all - 1)
-        targets.push_back(all & -all);
-    return targets;
 }
 
 /** M_R f by its definition [T5]: all pairs and images within range. */

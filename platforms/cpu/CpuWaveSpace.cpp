@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "CpuWaveSpace.h"
+#include "CpuSphereSpread.h"
+#include "CpuWindowSpread.h"
 #include "ParticleOrder.h"
-#include "numerics/Window.h"
 #include <algorithm>
 #include <cmath>
 
@@ -21,9 +22,8 @@ int waveChunks(int nz) {
 }
 
 /** Reals from one row of a grid to the next: whole chunks of modes, or points and repeated ends. */
-size_t gridRow(int nz, int support) {
-    return roundedUp(std::max(2 * WAVE_LANES * waveChunks(nz), nz + paddedSupport(support)),
-                     ROW_UNIT);
+size_t gridRow(int nz, int padding) {
+    return roundedUp(std::max(2 * WAVE_LANES * waveChunks(nz), nz + padding), ROW_UNIT);
 }
 
 /** From one plane to the next: an odd number of units, so that columns spread over the caches. */
@@ -32,16 +32,24 @@ size_t gridPlane(int ny, size_t rowLength) {
     return (units + 1 - units % 2) * ROW_UNIT;
 }
 
+template <class Real>
+std::unique_ptr<CpuSpread<Real>> makeSpreading(const Plan& plan, const Lattice& box,
+                                               const Threads& threads) {
+    if (plan.mixture)
+        return std::make_unique<CpuSphereSpread<Real>>(plan, box, threads);
+    return std::make_unique<CpuWindowSpread<Real>>(plan);
+}
+
 } // namespace
 
 template <class Real>
 CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Threads& threads)
-    : box(box), a(plan.a), threads(threads), support(plan.windowSupport),
-      padded(paddedSupport(plan.windowSupport)) {
+    : box(box), a(plan.a), threads(threads), spreading(makeSpreading<Real>(plan, box, threads)) {
     std::copy(plan.grid.begin(), plan.grid.end(), size);
     chunks = waveChunks(size[2]);
-    rowLength = gridRow(size[2], support);
+    rowLength = gridRow(size[2], spreading->padding());
     planeLength = gridPlane(size[1], rowLength);
+    spreading->setLayout(rowLength, planeLength);
     for (FftArray<Real>& grid : grids) {
         grid.resize(size[0] * planeLength);
         std::fill(grid.begin(), grid.begin() + size[0] * planeLength, Real(0));
@@ -54,23 +62,20 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     }
     fft.reset(new GridFft<Real>({{size[0], size[1], size[2]}, rowLength, planeLength, WAVE_LANES}));
 
-    const std::vector<Polynomial> pieces =
-        Window(support, plan.windowShape).polynomials(plan.windowError);
-    windowDegree = pieces[0].degree();
-    windowCoefficients.assign((windowDegree + 1) * padded, Real(0));
-    for (int power = 0; power <= windowDegree; power++)
-        for (int j = 0; j < support; j++)
-            windowCoefficients[(windowDegree - power) * padded + j] = Real(pieces[j].powers[power]);
     prepareFactors(WaveFactors(plan, box));
 }
 
 template <class Real> double CpuWaveSpace<Real>::bytesPerParticle(const Plan& plan) {
-    return 3.0 * (paddedSupport(plan.windowSupport) + 1) * sizeof(Real) + 5 * sizeof(int);
+    return plan.mixture ? CpuSphereSpread<Real>::bytesPerParticle(plan)
+                        : CpuWindowSpread<Real>::bytesPerParticle(plan);
 }
 
-template <class Real> double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan) {
+template <class Real>
+double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan, const Lattice& box) {
     const int ny = plan.grid[1], nz = plan.grid[2];
-    const double plane = gridPlane(ny, gridRow(nz, plan.windowSupport)),
+    const int padding = plan.mixture ? CpuSphereSpread<Real>::paddingOf(plan, box)
+                                     : paddedSupport(plan.windowSupport);
+    const double plane = gridPlane(ny, gridRow(nz, padding)),
                  factors = double(ny) * waveChunks(nz) * WAVE_LANES;
     return (3 * plane + factors) * sizeof(Real) / (double(ny) * nz);
 }
@@ -94,77 +99,13 @@ template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Ve
         threads, fractions, [](int, int) {}, *this);
 }
 
-template <class Real> void CpuWaveSpace<Real>::begin(int particles) {
-    columnOf.resize(particles);
-    first.resize(3 * size_t(particles));
-    sorted.resize(3 * size_t(particles));
-    weights.resize(3 * size_t(particles) * padded);
-}
-
-/**
- * Where the window of a particle at u begins, in grid units: ceil(u - P/2). Truncation is in line
- * on every machine, std::ceil a call.
- */
-template <class Real> int CpuWaveSpace<Real>::windowStart(double u) const {
-    const double shifted = u + 0.5 * support; // positive
-    const int below = static_cast<int>(shifted);
-    return below + (below < shifted) - support;
-}
-
-template <class Real>
-void CpuWaveSpace<Real>::assign(const std::vector<Vec3>& fractions, int from, int to) {
-    for (int i = from; i < to; i++)
-        columnOf[i] = wrapped(0, windowStart(fractions[i][0] * size[0])) * size[1] +
-                      wrapped(1, windowStart(fractions[i][1] * size[1]));
-}
-
-template <class Real> void CpuWaveSpace<Real>::sort() {
-    sortByKey(columnOf, size[0] * size[1], columnStart, order);
-}
-
-template <class Real>
-void CpuWaveSpace<Real>::place(const std::vector<Vec3>& fractions, int from, int to) {
-    Real offsets[3 * Threads::BLOCK];
-    for (int slot = from; slot < to; slot++) {
-        // Along x and y what assign() found: the column and the window must not disagree.
-        const int column = columnOf[order[slot]];
-        const Vec3& s = fractions[order[slot]];
-        int* const mine = first.data() + 3 * size_t(slot);
-        mine[0] = column / size[1];
-        mine[1] = column % size[1];
-        mine[2] = wrapped(2, windowStart(s[2] * size[2]));
-        for (int d = 0; d < 3; d++) {
-            const double u = s[d] * size[d];
-            const int start = (mine[d] > u ? mine[d] - size[d] : mine[d]); // always below u
-            offsets[3 * (slot - from) + d] = Real(2 * (start - u) + support - 1);
-        }
-    }
-    gridLoops.evaluateWindows({windowDegree, padded, windowCoefficients.data()}, offsets, to - from,
-                              weights.data() + 3 * size_t(from) * padded);
-}
-
-template <class Real>
-void CpuWaveSpace<Real>::takeForces(const std::vector<Vec3>& forces, double unit, int from,
-                                    int to) {
-    for (int slot = from; slot < to; slot++)
-        for (int c = 0; c < 3; c++)
-            sorted[3 * size_t(slot) + c] = Real(forces[order[slot]][c] / unit);
-}
-
-template <class Real> GridParticles<Real> CpuWaveSpace<Real>::particles() const {
-    return {support,      padded,         {size[0], size[1], size[2]},
-            rowLength,    planeLength,    columnStart.data(),
-            first.data(), weights.data(), sorted.data()};
-}
-
 template <class Real> void CpuWaveSpace<Real>::spread() {
-    const GridParticles<Real> placed = particles();
     // A plane belongs to one task, which adds the particles in their order: no two threads write
     // one number.
     threads.run(size[0], [&](int x, int thread) {
         Real* const own = scratch[thread]->begin();
         Real* const planes[3] = {own, own + planeLength, own + 2 * planeLength};
-        gridLoops.spreadPlane(placed, x, planes);
+        spreading->spreadPlane(x, planes);
         for (int c = 0; c < 3; c++)
             fft->planeForward(planes[c], own + 3 * planeLength, grids[c].begin() + x * planeLength);
     });
@@ -211,18 +152,14 @@ template <class Real> void CpuWaveSpace<Real>::gather(double unit, std::vector<V
             fft->planeBackward(plane, scratch[thread]->begin());
             for (int y = 0; y < size[1]; y++) {
                 Real* const row = plane + y * rowLength;
-                for (int z = size[2]; z < size[2] + padded; z++)
+                for (int z = size[2]; z < size[2] + spreading->padding(); z++)
                     row[z] = row[z - size[2]];
             }
         }
     });
-    const GridParticles<Real> placed = particles();
     const Real* data[3] = {grids[0].begin(), grids[1].begin(), grids[2].begin()};
-    threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
-        gridLoops.gatherVelocities(placed, from, to, data, sorted.data());
-        for (int slot = from; slot < to; slot++)
-            for (int c = 0; c < 3; c++)
-                u[order[slot]][c] += unit * double(sorted[3 * size_t(slot) + c]);
+    threads.runBlocks(spreading->places(), [&](int from, int to, int) {
+        spreading->addGathered(data, unit, from, to, u);
     });
 }
 

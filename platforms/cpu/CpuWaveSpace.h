@@ -2,8 +2,8 @@
 #ifndef OPENMMPSE_CPUWAVESPACE_H_
 #define OPENMMPSE_CPUWAVESPACE_H_
 
+#include "CpuSpread.h"
 #include "Fft.h"
-#include "GridKernels.h"
 #include "MobilityEngine.h"
 #include "Threads.h"
 #include "WaveKernels.h"
@@ -16,7 +16,7 @@
 namespace PSE {
 
 /**
- * The wave-space half on a grid [T4, T9, T10]: spread by the Kaiser-Bessel window, transform, scale
+ * The wave-space half on a grid [T4, T9, T10]: spread, transform, scale
  * (forced and thermal part together), transform back, gather. Mobilities in units of 1/(6 pi eta
  * a).
  */
@@ -24,18 +24,24 @@ template <class Real> class CpuWaveSpace {
 public:
     CpuWaveSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per grid point of everything that grows with the grid. */
-    static double bytesPerGridPoint(const numerics::Plan& plan);
+    static double bytesPerGridPoint(const numerics::Plan& plan, const numerics::Lattice& box);
     /** Bytes per particle. */
     static double bytesPerParticle(const numerics::Plan& plan);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts, those of placeParticles():
-    void begin(int particles);
-    void assign(const std::vector<numerics::Vec3>& fractions, int from, int to);
-    void sort();
-    void place(const std::vector<numerics::Vec3>& fractions, int from, int to);
+    void begin(int particles) { spreading->begin(particles); }
+    void assign(const std::vector<numerics::Vec3>& fractions, int from, int to) {
+        spreading->assign(fractions, from, to);
+    }
+    void sort() { spreading->sort(); }
+    void place(const std::vector<numerics::Vec3>& fractions, int from, int to) {
+        spreading->place(fractions, from, to);
+    }
     /** The forces of addVelocities() on the particles at places [from, to), over a unit. */
-    void takeForces(const std::vector<numerics::Vec3>& forces, double unit, int from, int to);
+    void takeForces(const std::vector<numerics::Vec3>& forces, double unit, int from, int to) {
+        spreading->takeForces(forces, unit, from, to);
+    }
     /**
      * u += unit (M_W f + noise M_W^{1/2} z).
      * @param forced  there are forces, and takeForces() was called for all places
@@ -52,9 +58,6 @@ private:
     }
     /** Signed wave index of a place along axis d. */
     int waveIndex(int d, int i) const { return 2 * i <= size[d] ? i : i - size[d]; }
-    GridParticles<Real> particles() const;
-    int windowStart(double u) const;
-    int wrapped(int d, int i) const { return i < 0 ? i + size[d] : i; }
     void spread();
     void scale(bool forced, Real noise, const numerics::NoiseKey& key);
     void scaleLine(int y, int thread, WaveColumns<Real> columns);
@@ -63,21 +66,17 @@ private:
     numerics::Lattice box;
     double a;
     const Threads& threads;
-    GridKernels<Real> gridLoops = gridKernels<Real>();
     WaveKernels<Real> waveLoops = waveKernels<Real>();
-    int support, padded, size[3], windowDegree;
+    int size[3];
     int chunks; ///< groups of WAVE_LANES modes along z
     size_t rowLength, planeLength;
-    std::vector<Real> windowCoefficients;
+    std::unique_ptr<CpuSpread<Real>> spreading;
     std::unique_ptr<GridFft<Real>> fft;
     FftArray<Real> grids[3];     ///< [x][y][z], real or complex
     FftArray<Real> factors;      ///< [y][chunk][x][WAVE_LANES]
     std::vector<int> keptChunks; ///< per y: beyond, no mode is kept
     /// per thread: four planes, or three blocks of columns
     std::vector<std::unique_ptr<FftArray<Real>>> scratch;
-    std::vector<int> order, columnOf, columnStart, first;
-    std::vector<Real> weights;
-    std::vector<Real> sorted; ///< forces, later velocities, in the order of columns
 };
 
 } // namespace PSE

@@ -46,7 +46,7 @@ private:
                                          StageClock& clock) const {
         requireMemory(
             plan, box, indices.size(),
-            {CpuWaveSpace<Real>::bytesPerGridPoint(plan), CpuRealSpace<Real>::BYTES_PER_PAIR,
+            {CpuWaveSpace<Real>::bytesPerGridPoint(plan, box), CpuRealSpace<Real>::BYTES_PER_PAIR,
              CpuRealSpace<Real>::BYTES_PER_PARTICLE + CpuWaveSpace<Real>::bytesPerParticle(plan)});
         return std::unique_ptr<MobilityEngine>(
             new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));

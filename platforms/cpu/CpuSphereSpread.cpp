@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+#include "CpuSphereSpread.h"
+#include "numerics/RadialWindow.h"
+#include <algorithm>
+#include <cmath>
+
+using namespace PSE::numerics;
+
+namespace PSE {
+
+namespace {
+
+RadialWindow windowOf(const Plan& plan) {
+    return RadialWindow(plan.windowSupport, plan.windowShape, plan.windowSpacing);
+}
+
+/** How many grid points a sphere of radius 1 (in radii of the Plan) reaches to along axis d. */
+double pointsPerLengthOf(const Plan& plan, const Lattice& box, int d) {
+    return plan.grid[d] * plan.a / box.width(d);
+}
+
+/** Grid points within `reach` on either side of any centre, at most. */
+int extentOf(double reach) {
+    return static_cast<int>(2 * reach) + 1;
+}
+
+} // namespace
+
+template <class Real> int CpuSphereSpread<Real>::paddingOf(const Plan& plan, const Lattice& box) {
+    const double reach = windowOf(plan).reach(plan.mixture->radii().back());
+    return extentOf(reach * pointsPerLengthOf(plan, box, 2)) + SPHERE_LANES;
+}
+
+template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan& plan) {
+    const double shapes = double(plan.mixture->radii().size()) /
+                          std::max<size_t>(1, plan.mixture->particleRadii().size());
+    return 6 * sizeof(Real) + 7 * sizeof(int) +
+           shapes * (sizeof(SphereShape<Real>) + sizeof(double) +
+                     (RadialWindow::MAX_DEGREE + 1) * sizeof(Real));
+}
+
+template <class Real>
+CpuSphereSpread<Real>::CpuSphereSpread(const Plan& plan, const Lattice& box, const Threads& threads)
+    : Base(plan.grid, paddingOf(plan, box)) {
+    for (int d = 0; d < 3; d++)
+        pointsPerLength[d] = pointsPerLengthOf(plan, box, d);
+    // |A s|^2 with A upper triangular, A_d = a_d/M_d: squares completed from z to x.
+    Matrix3 A = box.vectors() / plan.a;
+    for (int d = 0; d < 3; d++)
+        A.col(d) /= plan.grid[d];
+    const Matrix3 G = A.transpose() * A;
+    const double x = G(0, 0) - G(0, 2) * G(0, 2) / G(2, 2),
+                 y = G(1, 1) - G(1, 2) * G(1, 2) / G(2, 2),
+                 xy = G(0, 1) - G(0, 2) * G(1, 2) / G(2, 2);
+    plane = Real(x - xy * xy / y);
+    line = Real(y);
+    point = Real(G(2, 2));
+    skewY = Real(-xy / y);
+    skewX = Real(-G(0, 2) / G(2, 2));
+    skewZ = Real(-G(1, 2) / G(2, 2));
+
+    const std::vector<double>& radii = plan.mixture->radii();
+    for (double radius : plan.mixture->particleRadii())
+        shapeOf.push_back(
+            static_cast<int>(std::lower_bound(radii.begin(), radii.end(), radius) - radii.begin()));
+    makeShapes(plan, threads);
+}
+
+template <class Real>
+void CpuSphereSpread<Real>::makeShapes(const Plan& plan, const Threads& threads) {
+    const std::vector<double>& radii = plan.mixture->radii();
+    const RadialWindow window = windowOf(plan);
+    std::vector<SphereKernel> kernels(radii.size());
+    threads.runBlocks(static_cast<int>(radii.size()), [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            kernels[i] = window.kernel(radii[i], plan.windowError);
+    });
+    for (const SphereKernel& kernel : kernels)
+        degree = std::max(degree, kernel.polynomial.degree());
+    coefficients.assign(radii.size() * (degree + 1), Real(0));
+    for (size_t i = 0; i < radii.size(); i++) {
+        const SphereKernel& kernel = kernels[i];
+        // Without a hollow, rounding must not lose the centre itself, t = -1.
+        const Real least = kernel.inner > 0 ? Real(-1) : Real(-2);
+        SphereShape<Real> shape = {Real(kernel.scale), Real(kernel.shift), least, {}};
+        reach.push_back(kernel.reach);
+        for (int d = 0; d < 3; d++)
+            shape.extent[d] = extentOf(kernel.reach * pointsPerLength[d]);
+        widest = std::max(widest, shape.extent[0]);
+        shapes.push_back(shape);
+        const std::vector<double>& powers = kernel.polynomial.powers;
+        for (size_t p = 0; p < powers.size(); p++)
+            coefficients[i * (degree + 1) + degree - p] = Real(powers[p]);
+    }
+}
+
+template <class Real> void CpuSphereSpread<Real>::begin(int particles) {
+    Base::begin(particles);
+    offset.resize(3 * size_t(particles));
+    placedShape.resize(particles);
+}
+
+/** The lowest coordinate that a sphere at u reaches to along axis d, in grid points. */
+template <class Real> double CpuSphereSpread<Real>::lowest(int shape, int d, double u) const {
+    return u - reach[shape] * pointsPerLength[d];
+}
+
+template <class Real>
+void CpuSphereSpread<Real>::assign(const std::vector<Vec3>& fractions, int from, int to) {
+    const auto firstPoint = [&](int i, int d) {
+        const int start =
+            static_cast<int>(std::ceil(lowest(shapeOf[i], d, fractions[i][d] * size[d])));
+        return start - size[d] * static_cast<int>(std::floor(double(start) / size[d]));
+    };
+    for (int i = from; i < to; i++)
+        this->setColumn(i, firstPoint(i, 0), firstPoint(i, 1));
+}
+
+template <class Real>
+void CpuSphereSpread<Real>::place(const std::vector<Vec3>& fractions, int from, int to) {
+    for (int slot = from; slot < to; slot++) {
+        const int particle = order[slot], shape = shapeOf[particle];
+        int* const mine = first.data() + 3 * size_t(slot);
+        placedShape[slot] = shape;
+        for (int d = 0; d < 3; d++) {
+            const double u = fractions[particle][d] * size[d], low = lowest(shape, d, u);
+            // Along x and y the point that assign() found, in the image where it was found.
+            const double start = (d == 2 ? std::ceil(low) : 0);
+            mine[d] =
+                (d == 0
+                     ? this->columnX(particle)
+                     : (d == 1 ? this->columnY(particle)
+                               : static_cast<int>(start - size[2] * std::floor(start / size[2]))));
+            const double image = std::round((low - mine[d]) / size[d]);
+            offset[3 * size_t(slot) + d] = Real(mine[d] + size[d] * image - u);
+        }
+    }
+}
+
+template <class Real> GridSpheres<Real> CpuSphereSpread<Real>::spheres() const {
+    return {{size[0], size[1], size[2]},
+            padded,
+            widest,
+            rowLength,
+            planeLength,
+            columnStart.data(),
+            first.data(),
+            offset.data(),
+            placedShape.data(),
+            shapes.data(),
+            degree,
+            coefficients.data(),
+            plane,
+            line,
+            point,
+            skewY,
+            skewX,
+            skewZ,
+            sorted.data()};
+}
+
+template <class Real> void CpuSphereSpread<Real>::spreadPlane(int x, Real* const planes[3]) const {
+    loops.spreadPlane(spheres(), x, planes);
+}
+
+template <class Real>
+void CpuSphereSpread<Real>::gather(const Real* const grids[3], int from, int to) {
+    loops.gatherVelocities(spheres(), from, to, grids, sorted.data());
+}
+
+template class CpuSphereSpread<float>;
+template class CpuSphereSpread<double>;
+
+} // namespace PSE

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_SPHEREKERNELS_H_
+#define OPENMMPSE_SPHEREKERNELS_H_
+
+// Inner loops between unequal spheres and the grid, compiled for every instruction set and chosen
+// at run time.
+
+#include <cstddef>
+
+namespace PSE {
+
+/// points that a row of the grid may be read and written beyond the last one of a sphere
+constexpr int SPHERE_LANES = 8;
+
+/** What all spheres of one radius share [T31]. */
+template <class Real> struct SphereShape {
+    /// weight = polynomial in t = scale r^2 + shift, r in radii of the Plan, for `least` < t < 1
+    Real scale, shift, least;
+    int extent[3]; ///< grid points touched along each axis, at most
+};
+
+/** Unequal spheres on the grid, sorted by the column (x, y) of their first grid point. */
+template <class Real> struct GridSpheres {
+    int size[3]; ///< grid points M_d
+    int padding; ///< points by which rows are longer than the grid: largest extent and SPHERE_LANES
+    int widest;  ///< largest extent along x
+    size_t rowLength, planeLength; ///< reals from one row to the next, from one plane to the next
+    const int* columnStart;        ///< [M_x M_y + 1] first particle of each column (x, y)
+    const int* first;              ///< [n][3] first grid point touched, in [0, M_d)
+    const Real* offset;            ///< [n][3] from the sphere to that point, in grid points
+    const int* shape;              ///< [n] index of its radius
+    const SphereShape<Real>* shapes;
+    int degree;
+    const Real* coefficients; ///< [shapes][degree + 1], highest power first
+    /**
+     * The squared distance from the centre to grid point (x, y, z), in grid points from it, is
+     * plane x^2 + line (y - skewY x)^2 + point (z - skewX x - skewZ y)^2.
+     */
+    Real plane, line, point, skewY, skewX, skewZ;
+    const Real* forces; ///< [n][3]
+};
+
+template <class Real> struct SphereKernels {
+    /**
+     * Set three planes [y][z] to the forces of all spheres that touch the plane x; row ends are
+     * folded back.
+     */
+    void (*spreadPlane)(const GridSpheres<Real>& spheres, int x, Real* const planes[3]);
+    /**
+     * u[particle][3] for spheres [from, to) from the three grids, whose row ends repeat their
+     * beginnings: the transpose of spreading.
+     */
+    void (*gatherVelocities)(const GridSpheres<Real>& spheres, int from, int to,
+                             const Real* const grids[3], Real* u);
+};
+
+/** The loops for the best instruction set of this machine. */
+template <class Real> SphereKernels<Real> sphereKernels();
+
+} // namespace PSE
+
+#endif
