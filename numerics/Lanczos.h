@@ -11,20 +11,34 @@
 
 namespace PSE::numerics {
 
+/** How the small side works, and the words of its refusals. */
+struct LanczosKind {
+    int mostIterations;
+    bool many; ///< iterations: T^{1/2} e_1 by a method whose cost is linear in their number
+    const char *mobility, *remedy;
+};
+
 /**
  * The small tridiagonal side of the Lanczos process: coefficients of M^{1/2} z in the Krylov basis.
  */
 class LanczosTridiagonal {
 public:
     static constexpr int MAX_ITERATIONS = 100;
+    /// a real-space half is well conditioned: few iterations
+    static constexpr LanczosKind REAL_HALF = {
+        MAX_ITERATIONS, false, "real-space ",
+        "loosen the tolerance or set a larger splitting parameter"};
+    /// The mobility of chains and globules in an unbounded fluid is not.
+    static constexpr LanczosKind WHOLE = {1000, true, "", "loosen the tolerance"};
 
     /**
      * @param tolerance          relative error of M^{1/2} z (2-norm) at which to stop
      * @param negativeTolerance  eigenvalues above -negativeTolerance times the largest count as
      * zero: rounding, and the truncation of M itself
      */
-    LanczosTridiagonal(double tolerance, double negativeTolerance)
-        : tolerance(tolerance), negativeTolerance(negativeTolerance) {}
+    LanczosTridiagonal(double tolerance, double negativeTolerance,
+                       const LanczosKind& kind = REAL_HALF)
+        : tolerance(tolerance), negativeTolerance(negativeTolerance), kind(kind) {}
 
     /**
      * Add a row. The changes of M^{1/2} z from one iteration to the next fall about geometrically;
@@ -35,7 +49,8 @@ public:
      * @param beta   norm of the next basis vector before normalisation (0: the Krylov space is
      * exhausted)
      * @return whether the process is finished
-     * @throws std::runtime_error for an indefinite M, or without convergence in MAX_ITERATIONS
+     * @throws std::runtime_error for an indefinite M, or without convergence in as many iterations
+     * as there may be
      */
     bool add(double alpha, double beta);
     int iterations() const { return static_cast<int>(diagonal.size()); }
@@ -48,8 +63,12 @@ private:
      * changes.
      */
     double remaining(double change) const;
+    Eigen::VectorXd root(double& highest) const;
+    Eigen::VectorXd rootByEigenvalues(double& lowest, double& highest) const;
 
-    double tolerance, negativeTolerance, lastChange = 1, lastRatio = 0;
+    double tolerance, negativeTolerance;
+    LanczosKind kind;
+    double lastChange = 1, lastRatio = 0;
     std::vector<double> diagonal, offDiagonal;
     Eigen::VectorXd solution;
 };
@@ -67,18 +86,18 @@ private:
  *
  * with sums accumulated in double.
  *
+ * @param small            its tridiagonal side, new
  * @param reorthogonalise  against all earlier basis vectors: needed for errors near rounding
  * @return number of iterations
  */
 template <class Space>
-int lanczosSquareRoot(Space& space, typename Space::Vector& result, double tolerance,
-                      double negativeTolerance, bool reorthogonalise) {
+int lanczosSquareRoot(Space& space, typename Space::Vector& result, LanczosTridiagonal small,
+                      bool reorthogonalise) {
     std::vector<double> norms = {std::sqrt(space.dot(space.basis(0), space.basis(0)))};
     if (norms[0] == 0) {
         space.combine({0}, result);
         return 0;
     }
-    LanczosTridiagonal small(tolerance, negativeTolerance);
     for (int i = 0;; i++) {
         typename Space::Vector &current = space.basis(i), &next = space.basis(i + 1);
         // The norm of the next vector is the off-diagonal entry beta: next = M v_i - beta v_{i-1}.
@@ -101,6 +120,12 @@ int lanczosSquareRoot(Space& space, typename Space::Vector& result, double toler
         coefficients.push_back(norms[0] * small.coefficients()[i] / norms[i]);
     space.combine(coefficients, result);
     return small.iterations();
+}
+template <class Space>
+int lanczosSquareRoot(Space& space, typename Space::Vector& result, double tolerance,
+                      double negativeTolerance, bool reorthogonalise) {
+    return lanczosSquareRoot(space, result, LanczosTridiagonal(tolerance, negativeTolerance),
+                             reorthogonalise);
 }
 
 } // namespace PSE::numerics

@@ -32,13 +32,22 @@ void describeFluid(std::ostream& out, const PSEBrownianIntegrator& integrator, d
             << endl;
 }
 
+void describeGrid(std::ostream& out, const NumericalParameters& p) {
+    out << ", xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
+        << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
+        << ", window support " << p.windowSupport;
+}
+
 void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator,
                       const NumericalParameters& p) {
     out << "numerics: tolerance " << integrator.getErrorTolerance() << ", predicted error "
-        << p.predictedError << ", xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff
-        << " nm, grid " << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x "
-        << p.gridDimensions[2] << ", window support " << p.windowSupport << ", Lanczos tolerance "
-        << p.lanczosTolerance << ", " << p.precision << " precision" << endl;
+        << p.predictedError;
+    if (p.split != "none")
+        describeGrid(out, p);
+    else
+        out << ", direct sums over all pairs";
+    out << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision"
+        << endl;
 }
 
 void describeSplit(std::ostream& out, const NumericalParameters& p) {
@@ -78,7 +87,10 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
     const double a = scene.radii.empty() ? integrator.getRadius() : scene.radii[0];
     if (scene.hydrodynamics)
         out << "hydrodynamic interactions: on (" << scene.modelReason << ")" << endl
-            << "fluid: periodic in the box of the Context, " << scene.boundaryReason << endl;
+            << "fluid: "
+            << (scene.unbounded ? "unbounded, whatever the box of the Context, "
+                                : "periodic in the box of the Context, ")
+            << scene.boundaryReason << endl;
     else
         out << "hydrodynamic interactions: off (" << scene.modelReason << "), M = 1/(6 pi eta a)"
             << endl;
@@ -90,8 +102,9 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
     out << "particles: " << scene.mobile.size() << " mobile, " << scene.numMassless
         << " massless (they do not move and are transparent to the fluid)" << endl;
     describeFluid(out, integrator, a);
-    if (scene.hydrodynamics && parameters.split != "none") {
-        describeSplit(out, parameters);
+    if (scene.hydrodynamics && !scene.mobile.empty()) {
+        if (parameters.split != "none")
+            describeSplit(out, parameters);
         describeNumerics(out, integrator, parameters);
     }
     describeStages(out, stages);

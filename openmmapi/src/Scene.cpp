@@ -66,22 +66,24 @@ void checkSettings(const PSEBrownianIntegrator& integrator) {
                "RotnePragerYamakawa or FreeDraining");
 }
 
-void checkBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {
+void chooseBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {
     const auto boundary = integrator.getFluidBoundary();
-    if (boundary == PSEBrownianIntegrator::Unbounded)
-        refuse("setFluidBoundary(Unbounded): an unbounded fluid is not available; use Periodic "
-               "with a box that is large "
-               "against the molecule, or setMobilityModel(FreeDraining)");
-    if (boundary == PSEBrownianIntegrator::Periodic)
+    const bool automatic = (boundary == PSEBrownianIntegrator::Automatic);
+    const bool periodicForce = system.usesPeriodicBoundaryConditions();
+    scene.unbounded = (automatic ? !periodicForce : boundary == PSEBrownianIntegrator::Unbounded);
+    if (!automatic)
         scene.boundaryReason = "as set by setFluidBoundary";
-    else if (system.usesPeriodicBoundaryConditions())
+    else if (periodicForce)
         scene.boundaryReason = "because a Force uses periodic boundary conditions";
     else
-        refuse("setFluidBoundary(Automatic) means an unbounded fluid here, because no Force uses "
-               "periodic boundary conditions, "
-               "and an unbounded fluid is not available; call setFluidBoundary(Periodic) for a "
-               "fluid that is periodic in the "
-               "System's box");
+        scene.boundaryReason = "because no Force uses periodic boundary conditions";
+}
+
+bool equalRadii(const Scene& scene) {
+    for (double radius : scene.radii)
+        if (radius != scene.radii[0])
+            return false;
+    return true;
 }
 
 void checkRadii(const Scene& scene) {
@@ -114,9 +116,11 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
     scene.hydrodynamics =
         (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
     if (scene.hydrodynamics) {
-        checkBoundary(system, integrator, scene);
-        checkRadii(scene);
-        scene.modelReason = "Rotne-Prager-Yamakawa, equal radii";
+        chooseBoundary(system, integrator, scene);
+        if (!scene.unbounded)
+            checkRadii(scene);
+        scene.modelReason = string("Rotne-Prager-Yamakawa, ") +
+                            (equalRadii(scene) ? "equal radii" : "unequal radii");
     } else
         scene.modelReason = "setMobilityModel(FreeDraining) was called";
     return scene;

@@ -4,6 +4,7 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
+#include <cstring>
 #include <limits>
 #include <sstream>
 
@@ -20,6 +21,9 @@ namespace {
 constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 1";
 /// Boxes from the origin: there a position is known to 1e-7 of the box.
 constexpr double FARTHEST = 1e9;
+/// Radii that rounding of a coordinate may be, in an unbounded fluid: 1e-7 at 1e9 radii from the
+/// origin in double precision; in single precision a tenth at 2e6.
+constexpr double FINEST_PLACE = 1e-7, COARSEST_PLACE = 0.1, SINGLE_EPSILON = 1e-8;
 constexpr uint64_t LARGEST_COUNTER = uint64_t(1) << 48;
 
 template <class T> void write(std::ostream& stream, const T& value) {
@@ -75,15 +79,6 @@ void refuseNotFinite(const CheckedQuantity& quantity, int particle, const Vec3& 
     throw OpenMMException(message.str());
 }
 
-void refuseFarAway(int particle, const Vec3& position) {
-    std::ostringstream message;
-    message << "PSEBrownianIntegrator: particle " << particle << " is "
-            << position.cwiseAbs().maxCoeff() << " nm from the origin, more than " << FARTHEST
-            << " boxes, and its place in the box is lost to rounding; set "
-            << "positions nearer to the box";
-    throw OpenMMException(message.str());
-}
-
 void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
                                    const Scene& sceneSeen) {
     scene = sceneSeen;
@@ -96,6 +91,10 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
         seed = osrngseed() & 0x7FFFFFFF; // positive, like the seeds that users write
     if (!scene.hydrodynamics || scene.mobile.empty()) {
         useFreeDraining();
+        return;
+    }
+    if (scene.unbounded) {
+        planUnbounded(integrator);
         return;
     }
     const NumericalParameters& wish = integrator.getRequestedNumericalParameters();
@@ -114,6 +113,15 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
                                   choiceOf(integrator.getSplit())});
     adapt(*request);
     plan(request->box);
+}
+
+void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
+    UnboundedRequest wanted = {integrator.getErrorTolerance(),
+                               integrator.getRequestedNumericalParameters().lanczosTolerance};
+    adapt(wanted);
+    const UnboundedPlan made = makeUnboundedPlan(wanted, scene.radii);
+    useUnbounded(made);
+    unboundedPlan.reset(new UnboundedPlan(made));
 }
 
 Lattice PlannedStepKernel::currentBox() const {
@@ -144,9 +152,27 @@ bool PlannedStepKernel::followBox() {
 }
 
 double PlannedStepKernel::farthestPosition() const {
+    if (unboundedPlan) {
+        const double rounding = coordinateRounding();
+        const double place = (rounding > SINGLE_EPSILON ? COARSEST_PLACE : FINEST_PLACE);
+        return unboundedPlan->a * place / rounding;
+    }
     if (!request)
         return std::numeric_limits<double>::max();
     return FARTHEST * currentBox().vectors().diagonal().maxCoeff();
+}
+
+void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position) const {
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: particle " << particle << " is "
+            << position.cwiseAbs().maxCoeff() << " nm from the origin, more than ";
+    if (unboundedPlan)
+        message << farthestPosition() << " nm, and its distance to a neighbour is lost to "
+                << "rounding; set positions nearer to the origin";
+    else
+        message << FARTHEST << " boxes, and its place in the box is lost to rounding; set "
+                << "positions nearer to the box";
+    throw OpenMMException(message.str());
 }
 
 Thermal PlannedStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sample) const {
@@ -159,8 +185,13 @@ Thermal PlannedStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool
 NumericalParameters PlannedStepKernel::parametersOf(const Plan& plan) const {
     NumericalParameters p;
     p.split = "none";
-    p.precision = precisionName(plan);
+    p.precision = (unboundedPlan ? precisionName(*unboundedPlan) : precisionName(plan));
     p.randomSeed = seed;
+    if (unboundedPlan) {
+        p.lanczosTolerance = unboundedPlan->lanczosTolerance;
+        p.lanczosIterations = lanczosIterations();
+        p.predictedError = unboundedPlan->predictedError;
+    }
     if (!request)
         return p;
     p.split = plan.split->name();
@@ -192,14 +223,33 @@ Plan PlannedStepKernel::planFor(const Lattice& box) const {
     }
 }
 
+/** All radii, or where there are many what tells them from others. */
+string PlannedStepKernel::radiiInWords() const {
+    std::ostringstream text;
+    text.precision(17);
+    uint64_t digest = 14695981039346656037u; // FNV-1a over the bytes
+    bool equal = true;
+    for (double radius : scene.radii) {
+        equal = equal && radius == scene.radii[0];
+        unsigned char bytes[sizeof(double)];
+        std::memcpy(bytes, &radius, sizeof(double));
+        for (unsigned char byte : bytes)
+            digest = (digest ^ byte) * 1099511628211u;
+    }
+    text << "first radius " << (scene.radii.empty() ? 0 : scene.radii[0]) << " nm";
+    if (!equal)
+        text << ", radii of digest " << std::hex << digest;
+    return text.str();
+}
+
 string PlannedStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
     text.precision(17);
-    text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining") << ", viscosity "
-         << viscosity << " Da/(nm ps), first radius " << (scene.radii.empty() ? 0 : scene.radii[0])
-         << " nm, particles " << scene.mobile.size() << " of " << masses.size() << ", split "
-         << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff
+    text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining")
+         << (scene.unbounded ? ", unbounded" : "") << ", viscosity " << viscosity << " Da/(nm ps), "
+         << radiiInWords() << ", particles " << scene.mobile.size() << " of " << masses.size()
+         << ", split " << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff
          << " nm, prolate bandwidth " << p.prolateBandwidth << ", grid " << p.gridDimensions[0]
          << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
          << p.windowSupport << ", window shape " << p.windowShape << ", Lanczos tolerance "

@@ -8,6 +8,7 @@
 #include "StageClock.h"
 #include "Thermal.h"
 #include "numerics/Plan.h"
+#include "numerics/UnboundedPlan.h"
 #include "openmmpse/PSEKernels.h"
 #include <memory>
 
@@ -32,10 +33,6 @@ constexpr CheckedQuantity NEXT_POSITION = {"the next position", "nm", "use a sma
 /** @param particle  index in the System. @throws OpenMMException always */
 [[noreturn]] void refuseNotFinite(const CheckedQuantity& quantity, int particle,
                                   const numerics::Vec3& value);
-/** Refuse a position beyond PlannedStepKernel::farthestPosition(). @throws OpenMMException always
- */
-[[noreturn]] void refuseFarAway(int particle, const numerics::Vec3& position);
-
 /** A step kernel with a Plan. A platform derives from it and says where its data are. */
 class PlannedStepKernel : public IntegratePSEStepKernel {
 public:
@@ -59,12 +56,22 @@ protected:
      * @throws OpenMMException naming the memory needed and available, if the Plan does not fit
      */
     virtual void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) = 0;
+    /** Fill in what the platform knows of the request: its precision. */
+    virtual void adapt(numerics::UnboundedRequest& request) const = 0;
+    /**
+     * A fluid without a boundary, and without a box.
+     * @throws OpenMMException naming the memory needed and available, if the particles do not fit
+     */
+    virtual void useUnbounded(const numerics::UnboundedPlan& plan) = 0;
     /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
     virtual void useFreeDraining() = 0;
     /** Of the last thermal step. */
     virtual int lanczosIterations() const = 0;
     /** As getNumericalParameters() tells it; without a Plan, plan.split is NULL. */
     virtual std::string precisionName(const numerics::Plan& plan) const = 0;
+    virtual std::string precisionName(const numerics::UnboundedPlan& plan) const = 0;
+    /** Relative rounding of a coordinate of the Context. */
+    virtual double coordinateRounding() const { return 1.1e-16; }
 
     /**
      * Make Plan and engine anew if the box has changed; on failure the old ones stay.
@@ -74,10 +81,13 @@ protected:
     /** The noise of the next step, or of the next sample. */
     Thermal thermal(const PSEBrownianIntegrator& integrator, bool sample) const;
     /**
-     * Largest coordinate (nm) that still tells a place in the box.
+     * Largest coordinate (nm) that still tells a place in the box, or the distance to a neighbour
+     * in an unbounded fluid.
      * @throws OpenMMException naming a box that is not one, before positions are blamed for it
      */
     double farthestPosition() const;
+    /** Refuse a position beyond farthestPosition(). @throws OpenMMException always */
+    [[noreturn]] void refuseFarAway(int particle, const numerics::Vec3& position) const;
 
     Scene scene;
     std::vector<double> masses; ///< of all particles
@@ -89,13 +99,16 @@ private:
     numerics::Lattice currentBox() const;
     numerics::Plan planFor(const numerics::Lattice& box) const;
     void plan(const numerics::Lattice& box);
+    void planUnbounded(const PSEBrownianIntegrator& integrator);
     NumericalParameters parametersOf(const numerics::Plan& plan) const;
+    std::string radiiInWords() const;
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
     std::string signature(const numerics::Plan& plan) const;
 
-    /// NULL without hydrodynamics or mobile particles
+    /// NULL without hydrodynamics or mobile particles, and in an unbounded fluid
     std::unique_ptr<numerics::PlanRequest> request;
     numerics::Plan currentPlan = {};
+    std::unique_ptr<numerics::UnboundedPlan> unboundedPlan; ///< NULL in any other scene
     int seed = 0;
 };
 

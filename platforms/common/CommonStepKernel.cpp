@@ -71,7 +71,16 @@ void CommonStepKernel::adapt(PlanRequest& request) const {
     request.singleOnly = !realIsDouble(device);
 }
 
-std::string CommonStepKernel::precisionName(const Plan&) const {
+void CommonStepKernel::adapt(UnboundedRequest& request) const {
+    if (!realIsDouble(device))
+        request.singleFloor = SINGLE_PRECISION_FLOOR;
+}
+
+double CommonStepKernel::coordinateRounding() const {
+    return mixedIsDouble(device) ? PlannedStepKernel::coordinateRounding() : 6e-8;
+}
+
+std::string CommonStepKernel::precisionName() const {
     return device.getUseDoublePrecision()  ? "double"
            : device.getUseMixedPrecision() ? "mixed"
                                            : "single";
@@ -130,6 +139,11 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
         throw OpenMMException(message.str());
     }
     stepsSinceStart = 0;
+}
+
+void CommonStepKernel::useUnbounded(const UnboundedPlan&) {
+    throw OpenMMException("PSEBrownianIntegrator: an unbounded fluid is not available on devices; "
+                          "use the platform CPU");
 }
 
 void CommonStepKernel::useFreeDraining() {

@@ -34,11 +34,18 @@ protected:
     void boxVectors(OpenMM::Vec3 box[3]) const override;
     void adapt(numerics::PlanRequest& request) const override;
     void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) override;
+    void adapt(numerics::UnboundedRequest& request) const override;
+    void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void useFreeDraining() override;
     int lanczosIterations() const override { return engine->lanczosIterations(); }
-    std::string precisionName(const numerics::Plan& plan) const override;
+    std::string precisionName(const numerics::Plan&) const override { return precisionName(); }
+    std::string precisionName(const numerics::UnboundedPlan&) const override {
+        return precisionName();
+    }
+    double coordinateRounding() const override;
 
 private:
+    std::string precisionName() const;
     void requireRoom(const numerics::Plan& plan, const numerics::Lattice& box) const;
     MemoryUse memoryUse(const numerics::Plan& plan) const;
     bool measures() const;

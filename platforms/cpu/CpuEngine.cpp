@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "CpuEngine.h"
+#include "ForceUnit.h"
 #include "ParticleOrder.h"
 #include "numerics/Lanczos.h"
 #include <algorithm>
@@ -16,13 +17,6 @@ constexpr double SERIAL_WORK = 20000;
 
 bool isSmall(const Plan& plan, size_t particles) {
     return 10.0 * particles + plan.gridPoints() < SERIAL_WORK;
-}
-
-double largestComponent(const std::vector<Vec3>& forces) {
-    double largest = 0;
-    for (const Vec3& f : forces)
-        largest = std::max(largest, f.cwiseAbs().maxCoeff());
-    return largest;
 }
 
 } // namespace
@@ -54,18 +48,16 @@ template <class Real> void CpuEngine<Real>::setPositions(const std::vector<Vec3>
 template <class Real>
 void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const Thermal* thermal,
                                         std::vector<Vec3>& u) {
-    const double largest = (forces == NULL ? 0 : largestComponent(*forces));
-    const double thermalForce =
-        (thermal == NULL ? 0 : std::sqrt(2 * thermal->kT * drag / thermal->dt));
-    const double unit = std::max(largest, thermalForce); // of forces
+    const ForceUnit scale(forces, thermal, drag);
+    const double unit = scale.unit;
     if (unit == 0) {
         u.assign(indices.size(), Vec3::Zero());
         return;
     }
     u.resize(indices.size());
     clock.start();
-    const bool forced = largest > 0;
-    const Real noise = Real(thermalForce / unit);
+    const bool forced = scale.forced;
+    const Real noise = Real(scale.noise);
     if (forced) {
         multiplyReal(*forces, unit);
         clock.charge("real-space velocities");

@@ -54,8 +54,8 @@ constexpr int MOST_CELLS = 4;
 
 template <class Real>
 CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads)
-    : box(box), a(plan.a), range(plan.realCutoff), sumImages(plan.sumImages), threads(threads),
-      candidateRoom(threads.count()) {
+    : KrylovVectors<Real>(threads), box(box), a(plan.a), range(plan.realCutoff),
+      sumImages(plan.sumImages), candidateRoom(threads.count()) {
     const Matrix3& v = box.vectors();
     tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
     for (int d = 0; d < 3; d++)
@@ -73,6 +73,7 @@ template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Ve
 }
 
 template <class Real> void CpuRealSpace<Real>::begin(int particles) {
+    this->resize(particles);
     rowStart.resize(particles);
     rowCount.resize(particles);
     blocks.resize(Threads::blocks(particles));
@@ -238,57 +239,12 @@ template <class Real> PairRows<Real> CpuRealSpace<Real>::rows(int task) const {
     return {self, rowStart.data(), rowCount.data(), blocks[task].data()};
 }
 
-/** The sum of what work(from, to, task) returns, in the order of the tasks. */
-template <class Real>
-template <class Work>
-double CpuRealSpace<Real>::sumOverTasks(Work work) const {
-    const int n = static_cast<int>(rowStart.size());
-    partial.resize(Threads::blocks(n));
-    threads.runBlocks(n, [&](int from, int to, int task) { partial[task] = work(from, to, task); });
-    double total = 0;
-    for (double sum : partial)
-        total += sum;
-    return total;
-}
-
 template <class Real>
 double CpuRealSpace<Real>::multiplyAdd(const Vector& v, double s, const Vector& w, double t,
                                        Vector& out) const {
-    return sumOverTasks([&](int from, int to, int task) {
+    return this->sumOverTasks([&](int from, int to, int task) {
         return kernels.multiplyRows(rows(task), from, to, v.data(), Real(s), w.data(), Real(t),
                                     out.data());
-    });
-}
-
-template <class Real> typename CpuRealSpace<Real>::Vector& CpuRealSpace<Real>::basis(int i) {
-    while (static_cast<int>(krylov.size()) <= i)
-        krylov.emplace_back();
-    krylov[i].resize(3 * rowStart.size() + 1); // kernels read one number beyond
-    return krylov[i];
-}
-
-template <class Real> double CpuRealSpace<Real>::dot(const Vector& v, const Vector& w) const {
-    return sumOverTasks([&](int from, int to, int) {
-        return kernels.dot(3 * (to - from), v.data() + 3 * size_t(from),
-                           w.data() + 3 * size_t(from));
-    });
-}
-
-template <class Real>
-double CpuRealSpace<Real>::addScaled(double s, const Vector& v, Vector& out) const {
-    return sumOverTasks([&](int from, int to, int) {
-        return kernels.addScaled(3 * (to - from), Real(s), v.data() + 3 * size_t(from),
-                                 out.data() + 3 * size_t(from));
-    });
-}
-
-template <class Real>
-void CpuRealSpace<Real>::combine(const std::vector<double>& coefficients, Vector& out) const {
-    threads.runBlocks(static_cast<int>(rowStart.size()), [&](int from, int to, int) {
-        std::fill(out.begin() + 3 * size_t(from), out.begin() + 3 * size_t(to), Real(0));
-        for (size_t k = 0; k < coefficients.size(); k++)
-            for (size_t i = 3 * size_t(from); i < 3 * size_t(to); i++)
-                out[i] += Real(coefficients[k]) * krylov[k][i];
     });
 }
 

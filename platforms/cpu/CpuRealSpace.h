@@ -2,12 +2,10 @@
 #ifndef OPENMMPSE_CPUREALSPACE_H_
 #define OPENMMPSE_CPUREALSPACE_H_
 
-#include "PairKernels.h"
-#include "Threads.h"
+#include "KrylovVectors.h"
 #include "numerics/Lattice.h"
 #include "numerics/Plan.h"
 #include "numerics/Vec3.h"
-#include <deque>
 #include <vector>
 
 namespace PSE {
@@ -21,9 +19,9 @@ namespace PSE {
  * Vectors hold three numbers for each place: particles are sorted by cells, so that neighbours lie
  * close in memory.
  */
-template <class Real> class CpuRealSpace {
+template <class Real> class CpuRealSpace : public KrylovVectors<Real> {
 public:
-    using Vector = std::vector<Real>;
+    using typename KrylovVectors<Real>::Vector;
 
     CpuRealSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
     /** Bytes per particle and neighbour; per particle: half a block unused, ten vectors, places. */
@@ -44,13 +42,6 @@ public:
     /** out = s M_R v + t w. @return v . out */
     double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const;
 
-    // The vector operations of lanczosSquareRoot(); sums are taken block by block, in an order of
-    // their own.
-    Vector& basis(int i);
-    double dot(const Vector& v, const Vector& w) const;
-    double addScaled(double s, const Vector& v, Vector& out) const;
-    void combine(const std::vector<double>& coefficients, Vector& out) const;
-
 private:
     void prepareCells(int particles);
     void fillRowsOf(int task, int thread, const std::vector<numerics::Vec3>& fractions);
@@ -59,14 +50,14 @@ private:
     PairPolynomials<Real> polynomials() const;
     PairGeometry<Real> geometry() const;
     PairRows<Real> rows(int task) const;
-    template <class Work> double sumOverTasks(Work work) const;
+
+    using KrylovVectors<Real>::threads;
+    using KrylovVectors<Real>::kernels;
 
     numerics::Lattice box;
     double a, range;
     bool sumImages, tilted;
     double width[3]; ///< distances between opposite faces of the box
-    const Threads& threads;
-    PairKernels<Real> kernels = pairKernels<Real>();
     Real self;
     Vector coefficientsF, coefficientsC;
     double reach[3];  ///< of the range, in fractions of the box
@@ -76,8 +67,6 @@ private:
     std::vector<std::vector<PairBlock<Real>>> blocks; ///< one array per task of Threads::runBlocks
     std::vector<int32_t> rowStart, rowCount;          ///< [n], in the blocks of the row's task
     std::vector<std::vector<int32_t>> candidateRoom;  ///< one per thread
-    std::deque<Vector> krylov;
-    mutable std::vector<double> partial;
 };
 
 } // namespace PSE

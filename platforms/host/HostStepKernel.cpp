@@ -33,12 +33,20 @@ void HostStepKernel::useEngine(const Plan& plan, const Lattice& box) {
     engine = factory->create(plan, box, viscosity, scene.mobile, clock);
 }
 
+void HostStepKernel::useUnbounded(const UnboundedPlan& plan) {
+    engine = factory->createUnbounded(plan, scene.radii, viscosity, scene.mobile, clock);
+}
+
 void HostStepKernel::useFreeDraining() {
     engine = factory->createFreeDraining(viscosity, scene.radii, scene.mobile, clock);
 }
 
 string HostStepKernel::precisionName(const Plan& plan) const {
     return plan.split && plan.precision == Precision::Single ? "single" : "double";
+}
+
+string HostStepKernel::precisionName(const UnboundedPlan& plan) const {
+    return plan.precision == Precision::Single ? "single" : "double";
 }
 
 void HostStepKernel::followPositions() {

@@ -29,9 +29,12 @@ protected:
     void boxVectors(OpenMM::Vec3 box[3]) const override;
     void adapt(numerics::PlanRequest& request) const override { factory->adapt(request); }
     void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) override;
+    void adapt(numerics::UnboundedRequest& request) const override { factory->adapt(request); }
+    void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void useFreeDraining() override;
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan& plan) const override;
+    std::string precisionName(const numerics::UnboundedPlan& plan) const override;
 
 private:
     /** Follow the box of the Context, and give the engine the current positions. */

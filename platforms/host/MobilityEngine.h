@@ -5,6 +5,7 @@
 #include "StageClock.h"
 #include "Thermal.h"
 #include "numerics/Plan.h"
+#include "numerics/UnboundedPlan.h"
 #include <memory>
 #include <vector>
 
@@ -50,6 +51,16 @@ public:
                                                                const std::vector<double>& radii,
                                                                const std::vector<int>& indices,
                                                                StageClock& clock) const = 0;
+    /** Fill in what the platform knows of the request: its precision. */
+    virtual void adapt(numerics::UnboundedRequest& request) const = 0;
+    /**
+     * The fluid without a boundary.
+     * @param radii    of the mobile particles (nm)
+     * @throws OpenMMException naming the memory needed and available, if the particles do not fit
+     */
+    virtual std::unique_ptr<MobilityEngine>
+    createUnbounded(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
+                    double viscosity, const std::vector<int>& indices, StageClock& clock) const = 0;
 };
 
 } // namespace PSE

@@ -1,53 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "ReferenceEngine.h"
+#include "LanczosSpace.h"
 #include "numerics/Lanczos.h"
 #include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 using namespace PSE::numerics;
 using std::complex;
 
 namespace PSE {
-
-/** The vector operations of lanczosSquareRoot(). */
-class ReferenceEngine::LanczosSpace {
-public:
-    using Vector = Vectors;
-    explicit LanczosSpace(const ReferenceEngine& engine) : engine(engine) {}
-    Vector& basis(int i) {
-        while (static_cast<int>(vectors.size()) <= i)
-            vectors.emplace_back(engine.positions.size());
-        return vectors[i];
-    }
-    double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const {
-        engine.multiplyReal(v, out);
-        for (size_t i = 0; i < v.size(); i++)
-            out[i] = s * out[i] + t * w[i];
-        return dot(v, out);
-    }
-    double dot(const Vector& v, const Vector& w) const {
-        double sum = 0;
-        for (size_t i = 0; i < v.size(); i++)
-            sum += v[i].dot(w[i]);
-        return sum;
-    }
-    double addScaled(double s, const Vector& v, Vector& out) const {
-        for (size_t i = 0; i < v.size(); i++)
-            out[i] += s * v[i];
-        return dot(out, out);
-    }
-    void combine(const std::vector<double>& coefficients, Vector& out) const {
-        out.assign(engine.positions.size(), Vec3::Zero());
-        for (size_t k = 0; k < coefficients.size(); k++)
-            addScaled(coefficients[k], vectors[k], out);
-    }
-
-private:
-    const ReferenceEngine& engine;
-    std::deque<Vector> vectors; // references to earlier vectors stay valid while it grows
-};
 
 ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double viscosity,
                                  const std::vector<int>& indices, StageClock& clock)
@@ -156,7 +118,8 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
             u[i] += selfMobility * part[i];
     }
     if (thermal != NULL) {
-        LanczosSpace space(*this);
+        LanczosSpace space(u.size(),
+                           [this](const Vectors& v, Vectors& out) { multiplyReal(v, out); });
         Vectors& z = space.basis(0);
         for (size_t i = 0; i < u.size(); i++)
             particleNoise(thermal->real, indices[i], z[i].data());

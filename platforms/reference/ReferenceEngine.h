@@ -35,7 +35,6 @@ private:
         numerics::Vec3 direction; ///< k/|k|
         double B;                 ///< wave factor w/(eta V k^2)
     };
-    class LanczosSpace;
 
     void listModes();
     void addPair(int i, int j, const numerics::Vec3& d);

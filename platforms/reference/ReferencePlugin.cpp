@@ -3,6 +3,7 @@
 #include "Memory.h"
 #include "ReferenceEngine.h"
 #include "ReferenceFreeDraining.h"
+#include "ReferenceUnbounded.h"
 #include "openmm/KernelFactory.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/windowsExport.h"
@@ -35,6 +36,17 @@ public:
                                                        StageClock& clock) const override {
         return std::unique_ptr<MobilityEngine>(
             new ReferenceFreeDraining(viscosity, radii, indices, clock));
+    }
+    void adapt(numerics::UnboundedRequest& request) const override {
+        request.lanczosTolerance = ReferenceEngine::LANCZOS_TOLERANCE;
+    }
+    std::unique_ptr<MobilityEngine> createUnbounded(const numerics::UnboundedPlan& plan,
+                                                    const std::vector<double>& radii,
+                                                    double viscosity,
+                                                    const std::vector<int>& indices,
+                                                    StageClock& clock) const override {
+        return std::unique_ptr<MobilityEngine>(
+            new ReferenceUnbounded(plan, radii, viscosity, indices, clock));
     }
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "CpuEngine.h"
 #include "CpuFreeDraining.h"
+#include "CpuUnbounded.h"
 #include "HostStepKernel.h"
 #include "Memory.h"
 #include "openmm/KernelFactory.h"
@@ -37,6 +38,20 @@ public:
                                                        StageClock& clock) const override {
         return std::unique_ptr<MobilityEngine>(
             new CpuFreeDraining(viscosity, radii, indices, pool, clock));
+    }
+    void adapt(numerics::UnboundedRequest& request) const override {
+        request.singleFloor = SINGLE_PRECISION_FLOOR;
+    }
+    std::unique_ptr<MobilityEngine> createUnbounded(const numerics::UnboundedPlan& plan,
+                                                    const std::vector<double>& radii,
+                                                    double viscosity,
+                                                    const std::vector<int>& indices,
+                                                    StageClock& clock) const override {
+        if (plan.precision == numerics::Precision::Single)
+            return std::unique_ptr<MobilityEngine>(
+                new CpuUnbounded<float>(plan, radii, viscosity, indices, pool, clock));
+        return std::unique_ptr<MobilityEngine>(
+            new CpuUnbounded<double>(plan, radii, viscosity, indices, pool, clock));
     }
 
 private:

@@ -18,6 +18,7 @@ struct OPENMM_EXPORT_PSE Scene {
     std::vector<double> radii;  ///< their hydrodynamic radii (nm)
     int numMassless = 0;        ///< particles that do not move and are transparent to the fluid
     bool hydrodynamics = false; ///< particles feel each other through the fluid
+    bool unbounded = false; ///< that fluid is infinite, and the box of the Context plays no part
     std::string modelReason, boundaryReason;
 };
 

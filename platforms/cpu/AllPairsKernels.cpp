@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+#include "AllPairsKernels.h"
+#include "numerics/Rpy.h"
+#include <type_traits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "AllPairsKernels.cpp"
+#include <hwy/foreach_target.h> // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace PSE {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/** 1/sqrt(r2); in single precision to 3e-7 by one step of Newton's from the hardware's estimate. */
+template <class D> HWY_INLINE hn::Vec<D> inverseRoot(D d, hn::Vec<D> r2) {
+    using Real = hn::TFromD<D>;
+#if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128 && HWY_ARCH_X86
+    if constexpr (sizeof(Real) == 4) {
+        const auto s = hn::ApproximateReciprocalSqrt(r2);
+        const auto half = hn::Mul(hn::Set(d, Real(-0.5)), r2);
+        return hn::Mul(s, hn::MulAdd(hn::Mul(half, s), s, hn::Set(d, Real(1.5))));
+    }
+#endif
+    return hn::Div(hn::Set(d, Real(1)), hn::Sqrt(r2));
+}
+
+/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes.
+template <class Real> constexpr double SMALLEST_R2 = sizeof(Real) == 4 ? 1e-12 : 1e-30;
+
+/**
+ * F and C = (G - F)/r^2 of the Rotne-Prager-Yamakawa tensor of spheres of radius 1, by selection
+ * [T3].
+ */
+struct EqualSpheres {
+    template <class D, class Real = hn::TFromD<D>>
+    HWY_INLINE void operator()(D d, const AllPairs<Real>&, int, int, hn::Vec<D> r2, hn::Vec<D>& F,
+                               hn::Vec<D>& C) const {
+        using c = numerics::RpyCoefficients;
+        const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
+        r2 = hn::Max(r2, constant(SMALLEST_R2<Real>));
+        const auto s = inverseRoot(d, r2), s2 = hn::Mul(s, s);
+        const auto overlap = hn::Lt(r2, constant(c::CONTACT * c::CONTACT));
+        const auto apartF =
+            hn::Mul(s, hn::MulAdd(constant(c::APART_F3), s2, constant(c::APART_F1)));
+        const auto apartC = hn::Mul(s2, hn::MulAdd(constant(c::APART_G3 - c::APART_F3), s2,
+                                                   constant(c::APART_G1 - c::APART_F1)));
+        const auto overlapF = hn::MulAdd(constant(c::OVERLAP_F1), hn::Mul(r2, s), constant(1));
+        F = hn::IfThenElse(overlap, overlapF, apartF);
+        C = hn::Mul(s, hn::IfThenElse(overlap, constant(c::OVERLAP_G1 - c::OVERLAP_F1), apartC));
+    }
+};
+
+/** The same of spheres of any radii, apart, overlapping, or one inside the other [T24]. */
+struct UnequalSpheres {
+    template <class D, class Real = hn::TFromD<D>>
+    HWY_INLINE void operator()(D d, const AllPairs<Real>& p, int i, int j, hn::Vec<D> r2,
+                               hn::Vec<D>& F, hn::Vec<D>& C) const {
+        const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
+        r2 = hn::Max(r2, constant(SMALLEST_R2<Real>));
+        const auto ai = hn::Set(d, p.radius[i]), aj = hn::LoadU(d, p.radius + j);
+        const auto s = inverseRoot(d, r2), s2 = hn::Mul(s, s);
+        const auto sum = hn::Add(ai, aj), difference = hn::Sub(ai, aj),
+                   difference2 = hn::Mul(difference, difference);
+        const auto squares =
+            hn::Mul(constant(0.25), hn::Mul(s2, hn::MulAdd(ai, ai, hn::Mul(aj, aj))));
+        const auto apartF = hn::Mul(s, hn::Add(squares, constant(0.75)));
+        const auto apartC = hn::Mul(s, hn::NegMulAdd(constant(3), squares, constant(0.75)));
+        // of overlapping spheres, times ai aj
+        const auto inverse = hn::Div(constant(1), hn::Mul(ai, aj));
+        const auto scale = hn::Mul(constant(1.0 / 32), hn::Mul(s, s2));
+        const auto skew = hn::MulAdd(constant(3), r2, difference2), gap = hn::Sub(difference2, r2);
+        const auto partF = hn::Mul(
+            inverse, hn::NegMulAdd(hn::Mul(skew, skew), scale, hn::Mul(constant(0.5), sum)));
+        const auto partC =
+            hn::Mul(inverse, hn::Mul(constant(3), hn::Mul(scale, hn::Mul(gap, gap))));
+        const auto apart = hn::Gt(r2, hn::Mul(sum, sum)), inside = hn::Le(r2, difference2);
+        const auto insideF = hn::Mul(inverse, hn::Min(ai, aj));
+        F = hn::IfThenElse(apart, apartF, hn::IfThenElse(inside, insideF, partF));
+        C = hn::Mul(s2, hn::IfThenElse(apart, apartC, hn::IfThenZeroElse(inside, partC)));
+    }
+};
+
+/** What the loop over columns needs to know of its row. */
+template <class Real> struct Row {
+    Row(const AllPairs<Real>& p, int i, const Real* v)
+        : i(i), x(p.x[i]), y(p.y[i]), z(p.z[i]), vx(v[i]), vy(v[p.stride + i]),
+          vz(v[2 * size_t(p.stride) + i]) {
+        if (sizeof(Real) == 4) {
+            restX = p.restX[i];
+            restY = p.restY[i];
+            restZ = p.restZ[i];
+        }
+    }
+    int i;
+    Real x, y, z, restX = 0, restY = 0, restZ = 0, vx, vy, vz;
+};
+
+/** Difference of two coordinates, high parts first: they cancel without an error. */
+template <class D, class Real = hn::TFromD<D>>
+HWY_INLINE hn::Vec<D> displacement(D d, Real own, Real ownRest, const Real* HWY_RESTRICT other,
+                                   const Real* HWY_RESTRICT otherRest) {
+    const auto whole = hn::Sub(hn::Set(d, own), hn::LoadU(d, other));
+    if constexpr (sizeof(Real) == 8)
+        return whole;
+    else
+        return hn::Add(whole, hn::Sub(hn::Set(d, ownRest), hn::LoadU(d, otherRest)));
+}
+
+/**
+ * Both sides of the pairs of a row with the columns from j on.
+ * @param v  of the columns; u: sums of the row; w: of the columns
+ * @tparam DIAGONAL  only columns beyond the row
+ */
+template <bool DIAGONAL, class D, class Law, class V = hn::Vec<D>, class Real = hn::TFromD<D>>
+HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row<Real>& row, int j,
+                         V vx, V vy, V vz, V& ux, V& uy, V& uz, V& wx, V& wy, V& wz) {
+    const V dx = displacement(d, row.x, row.restX, p.x + j, p.restX + j),
+            dy = displacement(d, row.y, row.restY, p.y + j, p.restY + j),
+            dz = displacement(d, row.z, row.restZ, p.z + j, p.restZ + j);
+    const V r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+    V F, C;
+    law(d, p, row.i, j, r2, F, C);
+    if constexpr (DIAGONAL) {
+        const int skipped = row.i + 1 - j; // lanes up to the row itself
+        const auto out = hn::FirstN(d, skipped > 0 ? size_t(skipped) : 0);
+        F = hn::IfThenZeroElse(out, F);
+        C = hn::IfThenZeroElse(out, C);
+    }
+    const V ownX = hn::Set(d, row.vx), ownY = hn::Set(d, row.vy), ownZ = hn::Set(d, row.vz);
+    const V forRow = hn::Mul(C, hn::MulAdd(dx, vx, hn::MulAdd(dy, vy, hn::Mul(dz, vz))));
+    const V forColumn = hn::Mul(C, hn::MulAdd(dx, ownX, hn::MulAdd(dy, ownY, hn::Mul(dz, ownZ))));
+    ux = hn::MulAdd(forRow, dx, hn::MulAdd(F, vx, ux));
+    uy = hn::MulAdd(forRow, dy, hn::MulAdd(F, vy, uy));
+    uz = hn::MulAdd(forRow, dz, hn::MulAdd(F, vz, uz));
+    wx = hn::MulAdd(forColumn, dx, hn::MulAdd(F, ownX, wx));
+    wy = hn::MulAdd(forColumn, dy, hn::MulAdd(F, ownY, wy));
+    wz = hn::MulAdd(forColumn, dz, hn::MulAdd(F, ownZ, wz));
+}
+
+/** Two rows at once: what is loaded and stored of a column serves both. */
+template <class Law, class Real>
+void addRowsAny(const AllPairs<Real>& p, int from, int to, const Real* HWY_RESTRICT v,
+                Real* HWY_RESTRICT sums) {
+    const hn::CappedTag<Real, ALL_PAIRS_LANES> d;
+    using V = hn::Vec<decltype(d)>;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const Law law;
+    const size_t y = p.stride, z = 2 * size_t(p.stride);
+    for (int i = from; i < to; i += 2) {
+        const Row<Real> first(p, i, v), second(p, i + 1, v);
+        V u1x = hn::Zero(d), u1y = u1x, u1z = u1x, u2x = u1x, u2y = u1x, u2z = u1x;
+        const auto column = [&](auto diagonal, int j) {
+            constexpr bool DIAGONAL = decltype(diagonal)::value;
+            const V vx = hn::LoadU(d, v + j), vy = hn::LoadU(d, v + y + j),
+                    vz = hn::LoadU(d, v + z + j);
+            V wx = hn::LoadU(d, sums + j), wy = hn::LoadU(d, sums + y + j),
+              wz = hn::LoadU(d, sums + z + j);
+            addPairs<DIAGONAL>(d, law, p, first, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz);
+            addPairs<DIAGONAL>(d, law, p, second, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz);
+            hn::StoreU(wx, d, sums + j);
+            hn::StoreU(wy, d, sums + y + j);
+            hn::StoreU(wz, d, sums + z + j);
+        };
+        int j = i / lanes * lanes;
+        for (; j <= i + 1; j += lanes)
+            column(std::true_type(), j);
+        for (; j < p.count; j += lanes)
+            column(std::false_type(), j);
+        sums[i] += hn::GetLane(hn::SumOfLanes(d, u1x));
+        sums[y + i] += hn::GetLane(hn::SumOfLanes(d, u1y));
+        sums[z + i] += hn::GetLane(hn::SumOfLanes(d, u1z));
+        sums[i + 1] += hn::GetLane(hn::SumOfLanes(d, u2x));
+        sums[y + i + 1] += hn::GetLane(hn::SumOfLanes(d, u2y));
+        sums[z + i + 1] += hn::GetLane(hn::SumOfLanes(d, u2z));
+    }
+}
+
+// Dispatch tables hold functions, not templates: one name per precision.
+AllPairsKernels<float> singleAllPairsKernels(bool equalRadii) {
+    return {equalRadii ? addRowsAny<EqualSpheres, float> : addRowsAny<UnequalSpheres, float>};
+}
+AllPairsKernels<double> doubleAllPairsKernels(bool equalRadii) {
+    return {equalRadii ? addRowsAny<EqualSpheres, double> : addRowsAny<UnequalSpheres, double>};
+}
+
+} // namespace HWY_NAMESPACE
+} // namespace PSE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace PSE {
+
+HWY_EXPORT(singleAllPairsKernels);
+HWY_EXPORT(doubleAllPairsKernels);
+
+template <> AllPairsKernels<float> allPairsKernels<float>(bool equalRadii) {
+    return HWY_DYNAMIC_DISPATCH(singleAllPairsKernels)(equalRadii);
+}
+template <> AllPairsKernels<double> allPairsKernels<double>(bool equalRadii) {
+    return HWY_DYNAMIC_DISPATCH(doubleAllPairsKernels)(equalRadii);
+}
+
+} // namespace PSE
+#endif

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_ALLPAIRSKERNELS_H_
+#define OPENMMPSE_ALLPAIRSKERNELS_H_
+
+// Inner loops of an unbounded fluid, where every particle feels every other, compiled for every
+// instruction set and chosen at run time [T32].
+
+#include <cstddef>
+
+namespace PSE {
+
+/// Arrays are padded to a multiple of these: no vector of numbers is longer.
+constexpr int ALL_PAIRS_LANES = 16;
+
+/**
+ * Where the particles are, in units of the plan's radius. A coordinate is the sum of two numbers:
+ * in single precision they hold 48 bits, so that the displacement of two particles errs by
+ * rounding of itself alone wherever they are; in double precision the second ones are not read.
+ * Places from `count` on may be anywhere.
+ */
+template <class Real> struct AllPairs {
+    int count, stride; ///< stride: that of the arrays, a multiple of ALL_PAIRS_LANES
+    const Real *x, *y, *z;
+    const Real *restX, *restY, *restZ;
+    const Real* radius; ///< not read if all are 1
+};
+
+template <class Real> struct AllPairsKernels {
+    /**
+     * Add what pairs (i, j), from <= i < to, i < j, make of v, to both: sums += M v.
+     * from is even, to is even or count.
+     * @param v     [3][stride], zero from place `count` on
+     * @param sums  [3][stride], of which columns from `from` rounded down to ALL_PAIRS_LANES are
+     * changed; what is added from place `count` on means nothing
+     */
+    void (*addRows)(const AllPairs<Real>& pairs, int from, int to, const Real* v, Real* sums);
+};
+
+/**
+ * The loops for the best instruction set of this machine.
+ * @param equalRadii  all radii are 1
+ */
+template <class Real> AllPairsKernels<Real> allPairsKernels(bool equalRadii);
+
+} // namespace PSE
+
+#endif

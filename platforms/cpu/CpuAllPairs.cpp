@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "CpuAllPairs.h"
+#include <algorithm>
+#include <cmath>
+
+using namespace PSE::numerics;
+
+namespace PSE {
+
+namespace {
+/// Slabs, and so tasks of threads: enough for many threads, and short sums in single precision;
+/// few for memory, and for the time it takes to add them up.
+constexpr int PARTICLES_PER_SLAB = 64, MOST_SLABS = 64;
+} // namespace
+
+template <class Real> int CpuAllPairs<Real>::slabsFor(int particles) {
+    return std::clamp(particles / PARTICLES_PER_SLAB, 1, MOST_SLABS);
+}
+
+template <class Real> double CpuAllPairs<Real>::bytes(double particles, int iterations) {
+    const double vectors =
+        std::min(particles / PARTICLES_PER_SLAB, double(MOST_SLABS)) + iterations;
+    return particles * sizeof(Real) * (3 * (vectors + 6) + 2);
+}
+
+template <class Real>
+CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<double>& radii,
+                               const Threads& threads)
+    : KrylovVectors<Real>(threads), a(plan.a), count(static_cast<int>(radii.size())),
+      padded((count + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES * ALL_PAIRS_LANES),
+      loops(allPairsKernels<Real>(plan.equalRadii)), radius(padded, Real(1)), self(padded, Real(1)),
+      sums(slabsFor(count), Vector(3 * size_t(padded))) {
+    this->resize(padded);
+    for (int i = 0; i < count; i++) {
+        radius[i] = Real(radii[i] / a);
+        self[i] = Real(a / radii[i]);
+    }
+    for (int c = 0; c < 3; c++) {
+        places[c].assign(padded, Real(0));
+        rests[c].assign(padded, Real(0));
+    }
+    divideRows();
+}
+
+/** Slabs of about as many pairs each, starting at multiples of ALL_PAIRS_LANES. */
+template <class Real> void CpuAllPairs<Real>::divideRows() {
+    const int slabs = static_cast<int>(sums.size());
+    for (int slab = 0; slab < slabs; slab++) {
+        const double before = count * (1 - std::sqrt(1 - double(slab) / slabs));
+        const int row = static_cast<int>(before) / ALL_PAIRS_LANES * ALL_PAIRS_LANES;
+        firstRow.push_back(row);
+    }
+    firstRow.push_back(count);
+}
+
+template <class Real> void CpuAllPairs<Real>::setPositions(const std::vector<Vec3>& x) {
+    threads.runBlocks(count, [&](int from, int to, int) {
+        for (int i = from; i < to; i++)
+            for (int c = 0; c < 3; c++) {
+                const double reduced = x[i][c] / a;
+                places[c][i] = Real(reduced);
+                rests[c][i] = Real(reduced - double(places[c][i]));
+            }
+    });
+}
+
+template <class Real>
+double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w, double t,
+                                      Vector& out) const {
+    const AllPairs<Real> pairs = {
+        count,           padded,          places[0].data(), places[1].data(), places[2].data(),
+        rests[0].data(), rests[1].data(), rests[2].data(),  radius.data()};
+    threads.run(static_cast<int>(sums.size()), [&](int slab, int) {
+        Vector& mine = sums[slab];
+        for (int c = 0; c < 3; c++)
+            std::fill(mine.begin() + c * size_t(padded) + firstRow[slab],
+                      mine.begin() + (c + 1) * size_t(padded), Real(0));
+        loops.addRows(pairs, firstRow[slab], firstRow[slab + 1], v.data(), mine.data());
+    });
+    return this->sumOverTasks([&](int from, int to, int) {
+        return addSlabs(from, std::min(to, count), v, s, w, t, out);
+    });
+}
+
+/** Of places [from, to): all slabs, and what is not a pair. @return v . out */
+template <class Real>
+double CpuAllPairs<Real>::addSlabs(int from, int to, const Vector& v, double s, const Vector& w,
+                                   double t, Vector& out) const {
+    double sum[Threads::BLOCK], product = 0;
+    for (int c = 0; c < 3; c++) {
+        const size_t offset = c * size_t(padded);
+        std::fill(sum, sum + (to - from), 0.0);
+        for (size_t slab = 0; slab < sums.size(); slab++) {
+            const Real* const mine = sums[slab].data() + offset;
+            for (int i = std::max(from, firstRow[slab]); i < to; i++)
+                sum[i - from] += double(mine[i]);
+        }
+        for (int i = from; i < to; i++)
+            out[offset + i] = Real(s * (double(self[i]) * double(v[offset + i]) + sum[i - from]) +
+                                   t * double(w[offset + i]));
+        product += kernels.dot(to - from, v.data() + offset + from, out.data() + offset + from);
+    }
+    return product;
+}
+
+template class CpuAllPairs<float>;
+template class CpuAllPairs<double>;
+
+} // namespace PSE

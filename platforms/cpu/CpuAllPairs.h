@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+#ifndef OPENMMPSE_CPUALLPAIRS_H_
+#define OPENMMPSE_CPUALLPAIRS_H_
+
+#include "AllPairsKernels.h"
+#include "KrylovVectors.h"
+#include "numerics/UnboundedPlan.h"
+#include "numerics/Vec3.h"
+#include <vector>
+
+namespace PSE {
+
+/**
+ * The mobility of an unbounded fluid as a sum over all pairs, each evaluated once per product and
+ * kept nowhere: recomputing costs less than loading [T32]. Mobilities in units of 1/(6 pi eta a),
+ * lengths in a, the plan's radius. Vectors are three arrays, one per component, of stride() places
+ * in the order of the particles; those beyond the last particle hold zeros.
+ *
+ * Rows of pairs are divided into slabs, as many as the number of particles says, and each slab adds
+ * up what it finds in an order and at a place of its own: the sum of all is the same for any number
+ * of threads.
+ */
+template <class Real> class CpuAllPairs : public KrylovVectors<Real> {
+public:
+    using typename KrylovVectors<Real>::Vector;
+
+    /** @param radii  of the particles (nm) */
+    CpuAllPairs(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
+                const Threads& threads);
+    /** Bytes for so many particles, with so many Lanczos iterations. */
+    static double bytes(double particles, int iterations);
+    /** @param x  positions (nm) */
+    void setPositions(const std::vector<numerics::Vec3>& x);
+    int stride() const { return padded; }
+    /** out = s M v + t w. @return v . out */
+    double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const;
+
+private:
+    static int slabsFor(int particles);
+    void divideRows();
+    double addSlabs(int from, int to, const Vector& v, double s, const Vector& w, double t,
+                    Vector& out) const;
+
+    using KrylovVectors<Real>::threads;
+    using KrylovVectors<Real>::kernels;
+
+    double a;
+    int count, padded;
+    AllPairsKernels<Real> loops;
+    Vector radius, self;              ///< radius over a, and its inverse
+    Vector places[3], rests[3];       ///< coordinates, and what single precision leaves of them
+    std::vector<int> firstRow;        ///< of each slab; the last is `count`
+    mutable std::vector<Vector> sums; ///< one per slab, like a vector
+};
+
+} // namespace PSE
+
+#endif
