@@ -2,6 +2,7 @@
 // Lanczos square roots against the dense principal square root.
 
 #include "numerics/Lanczos.h"
+#include "numerics/TridiagonalRoot.h"
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -21,8 +22,8 @@ namespace {
 struct DenseSpace {
     using Vector = VectorXd;
 
-    explicit DenseSpace(const MatrixXd& M)
-        : M(M), storage(LanczosTridiagonal::MAX_ITERATIONS + 1, VectorXd::Zero(M.rows())) {}
+    explicit DenseSpace(const MatrixXd& M, int most = LanczosTridiagonal::MAX_ITERATIONS)
+        : M(M), storage(most + 1, VectorXd::Zero(M.rows())) {}
     Vector& basis(int i) { return storage.at(i); }
     double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) {
         out = s * (M * v) + t * w;
@@ -270,4 +271,75 @@ TEST(Lanczos, LackOfConvergenceIsRefusedWithTheNumbers) {
     expectMentions(o.message, {"did not converge", "100", "1e-13", "smallest eigenvalue",
                                "loosen the tolerance"});
     EXPECT_EQ(o.products, LanczosTridiagonal::MAX_ITERATIONS);
+}
+
+namespace {
+
+/** The tridiagonal matrix of `n` Lanczos iterations on a matrix with given eigenvalues. */
+void tridiagonal(const VectorXd& values, int n, std::vector<double>& diagonal,
+                 std::vector<double>& offDiagonal) {
+    VectorXd v = randomVector(static_cast<int>(values.size()), 9).normalized(), last = 0 * v;
+    double beta = 0;
+    for (int i = 0; i < n; i++) {
+        VectorXd next = values.cwiseProduct(v) - beta * last;
+        diagonal.push_back(v.dot(next));
+        next -= diagonal.back() * v;
+        beta = next.norm();
+        if (i + 1 < n)
+            offDiagonal.push_back(beta);
+        last = v;
+        v = next / beta;
+    }
+}
+
+VectorXd rootOfDense(const std::vector<double>& diagonal, const std::vector<double>& offDiagonal) {
+    const int n = static_cast<int>(diagonal.size());
+    MatrixXd T = MatrixXd::Zero(n, n);
+    for (int i = 0; i < n; i++) {
+        T(i, i) = diagonal[i];
+        if (i + 1 < n)
+            T(i, i + 1) = T(i + 1, i) = offDiagonal[i];
+    }
+    return squareRoot(T).col(0);
+}
+
+} // namespace
+
+TEST(TridiagonalRoot, ErrsByNoMoreThanAsked) {
+    for (double condition : {1.0 + 1e-9, 10.0, 1e4, 1e8})
+        for (int n : {1, 2, 7, 40})
+            for (double scale : {1e-5, 1.0, 1e5}) {
+                std::vector<double> diagonal, offDiagonal;
+                tridiagonal(scale * spread(60, condition), n, diagonal, offDiagonal);
+                const VectorXd exact = rootOfDense(diagonal, offDiagonal);
+                for (double error : {1e-3, 1e-6, 1e-12}) {
+                    VectorXd x;
+                    ASSERT_TRUE(tridiagonalRoot(diagonal, offDiagonal, error, x));
+                    EXPECT_LE((x - exact).norm(), 2 * error * std::sqrt(diagonal[0]))
+                        << "condition " << condition << ", size " << n << ", error " << error;
+                }
+            }
+}
+
+TEST(TridiagonalRoot, LeavesIndefiniteMatricesToOthers) {
+    VectorXd x;
+    EXPECT_FALSE(tridiagonalRoot({1, 1}, {1.001}, 1e-6, x));
+    EXPECT_TRUE(tridiagonalRoot({1, 1}, {0.999}, 1e-6, x));
+    EXPECT_DOUBLE_EQ(largestEigenvalueBound({1, 2, 1}, {0.5, -0.25}), 2.75);
+}
+
+// What chains and globules need: many iterations, and a semi-definite matrix of coincident
+// particles; the process must end, at the dense root.
+TEST(Lanczos, OfAWholeMobilityTakesAsManyIterationsAsItNeeds) {
+    VectorXd values = spread(250, 1e6);
+    values.tail(5).setZero();
+    const MatrixXd M = withEigenvalues(values, 4);
+    DenseSpace space(M, 1000);
+    space.basis(0) = randomVector(250, 5);
+    const VectorXd exact = squareRoot(M) * space.basis(0);
+    VectorXd root;
+    const int iterations = lanczosSquareRoot(
+        space, root, LanczosTridiagonal(1e-8, 1e-12, LanczosTridiagonal::WHOLE), true);
+    EXPECT_GT(iterations, LanczosTridiagonal::MAX_ITERATIONS);
+    EXPECT_LE((root - exact).norm(), 6e-8 * exact.norm());
 }

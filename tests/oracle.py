@@ -159,6 +159,55 @@ def mobilityMatrix(positions, box, a, viscosity=None, xi=None):
     return M if viscosity is None else M/(6*np.pi*viscosity*a)
 
 
+def freeSpaceScalars(r, ai, aj):
+    """
+    The same between spheres of radii ai and aj (broadcast against r), in units of 1/(6 pi eta) and
+    1/nm: P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), whose
+    scalars of 1 and rr are added up here.
+    """
+    r, ai, aj = np.broadcast_arrays(np.asarray(r, dtype=float), ai, aj)
+    large, small = np.maximum(ai, aj), np.minimum(ai, aj)
+    far = np.maximum(r, ai + aj)
+    squares = (ai**2 + aj**2)/far**2
+    isotropic, dyadic = 3/(4*far)*(1 + squares/3), 3/(4*far)*(1 - squares)
+    near = np.where((r > large - small) & (r < ai + aj), r, ai + aj)
+    gap = (ai - aj)**2
+    partIsotropic = (16*near**3*(ai + aj) - (gap + 3*near**2)**2)/(32*near**3)/(ai*aj)
+    partDyadic = 3*(gap - near**2)**2/(32*near**3)/(ai*aj)
+    inside, apart = r <= large - small, r >= ai + aj
+    one = np.where(apart, isotropic, np.where(inside, 1/large, partIsotropic))
+    rr = np.where(apart, dyadic, np.where(inside, 0, partDyadic))
+    return one, one + rr
+
+
+def gaussianScalars(r, ai, aj):
+    """
+    The same between Gaussian envelopes of widths ai/sqrt(pi) and aj/sqrt(pi): the regularised
+    Stokeslet of one Gaussian whose variance is the sum of both (M. R. Maxey, B. K. Patel, Int. J.
+    Multiphase Flow 27, 1603 (2001)), by the Boys functions, which have no cancellation at r = 0.
+    """
+    variance = (np.square(ai) + np.square(aj))/np.pi
+    t = np.asarray(r, dtype=float)**2/(2*variance)
+    f0, f1, _ = boysFunctions(t)
+    scale = 1.5/np.sqrt(2*np.pi*variance)
+    return scale*(f0 + f1), 2*scale*(f0 - f1)
+
+
+def unboundedMobilityMatrix(positions, radii, viscosity, scalars=freeSpaceScalars):
+    """The mobility (3N,3N) of spheres of any radii (N,) in infinite solvent, with its units."""
+    positions = np.asarray(positions, dtype=float).reshape(-1, 3)
+    radii = np.asarray(radii, dtype=float)
+    N = len(positions)
+    r = positions[:, None, :] - positions[None, :, :]
+    distance = np.linalg.norm(r, axis=2)
+    unit = r/np.where(distance > 0, distance, 1)[:, :, None]
+    perp, par = scalars(distance, radii[:, None], radii[None, :])
+    M = perp[:, :, None, None]*np.eye(3)
+    M = M + (par - perp)[:, :, None, None]*unit[:, :, :, None]*unit[:, :, None, :]
+    M[np.arange(N), np.arange(N)] = np.eye(3)/radii[:, None, None]
+    return M.transpose(0, 2, 1, 3).reshape(3*N, 3*N)/(6*np.pi*viscosity)
+
+
 def freeSpaceMobilityMatrix(positions, a):
     """The mobility (3N,3N) in infinite solvent, in units of 1/(6 pi eta a)."""
     positions = np.asarray(positions, dtype=float).reshape(-1, 3)

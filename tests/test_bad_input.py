@@ -222,11 +222,7 @@ def addConstraint(system):
      ["setParticleRadius", "particle 3", "0.7", "0.5", "FreeDraining"]),
     (lambda i: i.setShearRate(0.25), ["setShearRate", "0.25", "0"]),
     (lambda i: i.setMobilityModel(PSEBrownianIntegrator.ForceCoupling),
-     ["setMobilityModel", "ForceCoupling", "RotnePragerYamakawa"]),
-    (lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Unbounded),
-     ["setFluidBoundary", "Unbounded", "Periodic"]),
-    (lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Automatic),
-     ["Automatic", "no Force uses periodic", "setFluidBoundary(Periodic)"])])
+     ["setMobilityModel", "ForceCoupling", "RotnePragerYamakawa"])])
 def testSettingsOfLaterVersions(platformName, configure, words):
     assertMentions(refusal(platformName, configure), "PSEBrownianIntegrator", *words)
 
