@@ -37,7 +37,8 @@ void checkRequest(const PlanRequest& r) {
     const double phi = volumeFraction(r);
     if (message.str().empty() && !(phi <= DENSEST))
         message << "the volume fraction is " << phi << " (" << r.numParticles
-                << " particles of radius " << r.radius << " nm in " << r.box.volume()
+                << " particles of radius " << r.radius << " nm"
+                << (r.radii.empty() ? "" : " and others") << " in " << r.box.volume()
                 << " nm^3), the limit is " << DENSEST << "; use a larger box or fewer particles";
     if (!message.str().empty())
         throw std::invalid_argument(message.str());
@@ -47,7 +48,7 @@ void checkRequest(const PlanRequest& r) {
 
 void checkPlan(const Plan& plan, const PlanRequest& request) {
     std::ostringstream message;
-    if (!plan.split) {
+    if (!plan.split && !plan.mixture) {
         message << "no numerical parameters fit a radius of " << request.radius
                 << " nm in this box; check the units of radius and box";
         throw std::invalid_argument(message.str());
@@ -137,7 +138,19 @@ bool isPrescribed(const PlanOverrides& wish) {
 
 } // namespace
 
+bool isMixture(const std::vector<double>& radii) {
+    return std::any_of(radii.begin(), radii.end(), [&](double a) { return a != radii[0]; });
+}
+
 Plan makePlan(const PlanRequest& request) {
+    if (isMixture(request.radii)) {
+        PlanRequest mixed = request;
+        mixed.radius = MixturePlans::unitRadius(request.radii);
+        checkRequest(mixed);
+        const Plan plan = MixturePlans(mixed).best();
+        checkPlan(plan, mixed);
+        return plan;
+    }
     checkRequest(request);
     if (request.split == SplitChoice::Hasimoto)
         return hasimotoPlan(request, "as prescribed");

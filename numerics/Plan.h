@@ -71,6 +71,7 @@ struct Plan {
     double windowShape;      ///< beta
     /// of a mixture: the window is radial, of diameter P times this length (in units of a); else 0
     double windowSpacing;
+    int radiusFunctions;     ///< of a mixture: size of the MixtureTable, else 0
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
     double windowError;      ///< absolute error allowed in the weights of the window
@@ -82,6 +83,9 @@ struct Plan {
     /** Number of grid points; double, because a request may exceed any integer. */
     double gridPoints() const { return double(grid[0]) * grid[1] * grid[2]; }
 };
+
+/** Whether not all radii are the same. */
+bool isMixture(const std::vector<double>& radii);
 
 /**
  * Choose all parameters so that the predicted error for unit random forces at volume fraction

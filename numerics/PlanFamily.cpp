@@ -91,6 +91,12 @@ double shapeFor(double error, int support) {
 }
 
 double volumeFraction(const PlanRequest& r) {
+    if (!r.radii.empty()) {
+        double cubes = 0;
+        for (double a : r.radii)
+            cubes += a * a * a;
+        return 4.0 / 3 * M_PI * cubes / r.box.volume();
+    }
     return r.numParticles * 4.0 / 3 * M_PI * r.radius * r.radius * r.radius / r.box.volume();
 }
 
@@ -142,7 +148,7 @@ void PlanFamily::completeRealHalf(Plan& plan) const {
         (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5 * request.tolerance);
     plan.tableError = TABLE_SHARE * request.tolerance * boxShare(box);
     const bool single = request.tolerance >= request.singleFloor &&
-                        plan.realCutoff / plan.a <= plan.split->tableRange(true);
+                        (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
     plan.precision = (single ? Precision::Single : Precision::Double);
 }
 
@@ -150,10 +156,13 @@ double PlanFamily::realErrorOf(const Plan& plan) const {
     return plan.split->realTruncation(plan.realCutoff / plan.a, phi, meanPhi);
 }
 
+Magnification PlanFamily::magnificationOf(const Plan& plan) const {
+    return magnification(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
+}
+
 void PlanFamily::predict(Plan& plan, double wave) const {
     plan.predictedError = std::hypot(wave, realErrorOf(plan));
-    const Magnification magnified =
-        magnification(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi);
+    const Magnification magnified = magnificationOf(plan);
     const bool finer = plan.predictedError < SINGLE_SHARE * request.singleFloor;
     if ((finer && !request.singleOnly) ||
         magnified.of(SINGLE_ROUNDING) > ROUNDING_SHARE * request.tolerance)
@@ -165,6 +174,10 @@ void PlanFamily::predict(Plan& plan, double wave) const {
         (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);
     plan.predictedError = std::hypot(plan.predictedError,
                                      magnified.of(rounding + (usual > 1 ? plan.windowError : 0)));
+}
+
+double PlanFamily::shapeOf(int support) const {
+    return shapeFor(error, support);
 }
 
 std::vector<int> PlanFamily::supports() const {
@@ -225,7 +238,7 @@ Plan PlanFamily::finished(const Plan& plan, double unit) const {
         Plan candidate = plan;
         candidate.windowSupport = candidates[i];
         if (request.overrides.windowShape == 0)
-            candidate.windowShape = shapeFor(error, candidates[i]);
+            candidate.windowShape = shapeOf(candidates[i]);
         double wave = 0;
         const bool fit = fitGrid(candidate, unit, wave);
         if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {

@@ -5,8 +5,10 @@
 // For each split a one-parameter family of Plans that keep the tolerance, and the cheapest of them.
 // For makePlan() only.
 
+#include "numerics/MixtureErrors.h"
 #include "numerics/Plan.h"
 #include "numerics/ProlateSplit.h"
+#include "numerics/Quadrature.h"
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,23 +33,26 @@ class PlanFamily {
 public:
     virtual ~PlanFamily() = default;
     /** The time of one step by the model of PlanCost.h. */
-    double cost(const Plan& plan) const;
+    virtual double cost(const Plan& plan) const;
     /** The share of the real half in it, for a range (nm) within half the box. */
-    double realCost(double range) const;
+    virtual double realCost(double range) const;
 
 protected:
     /** @param share  of the tolerance that the wave half may use */
     PlanFamily(const PlanRequest& request, double share);
-    double waveErrorOf(const Plan& plan) const;
+    virtual double waveErrorOf(const Plan& plan) const;
     /** With M_R, in a step. */
     double products() const;
     /** The smallest grid whose modes reach a Nyquist wave number (1/a) in every direction. */
     std::array<int, 3> gridFor(double nyquist, int support) const;
     /** Everything that follows from split and range alone. */
     void completeRealHalf(Plan& plan) const;
-    double realErrorOf(const Plan& plan) const;
+    virtual double realErrorOf(const Plan& plan) const;
+    /** What the wave half makes of small errors of weights and of numbers on the grid. */
+    virtual Magnification magnificationOf(const Plan& plan) const;
     /** Window supports worth trying first: by the rule, and one less on a finer grid. */
-    std::vector<int> supports() const;
+    virtual std::vector<int> supports() const;
+    virtual double shapeOf(int support) const;
     /**
      * The same split with the cheapest window and the smallest grid that keep the budget by the
      * full estimate, or come nearest to it, and the error that it predicts.
@@ -111,6 +116,56 @@ private:
 };
 
 /**
+ * Plans for unequal radii, all with one envelope [T28]: of a prolate one by its range R, where a
+ * pair has the range R + ai + aj, of Hasimoto's by xi. Real half and wave half are positive
+ * whatever range and bandwidth are.
+ */
+class MixturePlans : public PlanFamily {
+public:
+    /**
+     * @param request  with radii, and unitRadius() of them as radius
+     */
+    explicit MixturePlans(const PlanRequest& request);
+    /** 1/sqrt(mean of 1/a_i^2): unit forces have mobilities of 1 in units of 1/(6 pi eta a). */
+    static double unitRadius(const std::vector<double>& radii);
+    /**
+     * The cheapest.
+     * @throws std::invalid_argument naming what cannot be met
+     */
+    Plan best() const;
+    double cost(const Plan& plan) const override;
+
+protected:
+    double waveErrorOf(const Plan& plan) const override;
+    double realErrorOf(const Plan& plan) const override;
+    Magnification magnificationOf(const Plan& plan) const override;
+    std::vector<int> supports() const override;
+    double shapeOf(int support) const override;
+
+private:
+    bool isProlate() const { return request.split != SplitChoice::Hasimoto; }
+    RadialWindow windowOf(const Plan& plan) const;
+    double pairsOf(double range, bool sumImages) const;
+    double largestDiameter() const { return 2 * composition.radii.back(); }
+    /** R of what is prescribed; 0 if nothing is. */
+    double givenRange() const;
+    double bandwidthFor(double R) const;
+    std::shared_ptr<const Mixture> hasimotoMixture(double xi) const;
+    /** Candidate with a prolate range R, or Hasimoto's xi, and the grid of a closed rule. */
+    Plan at(double parameter) const;
+    void setRange(Plan& plan, double R) const;
+    double unitOf(const Plan& plan) const;
+    Plan cheapest() const;
+    void requireTolerance(const Plan& plan) const;
+    /** The arithmetic that the tables need. */
+    void checkTables(Plan& plan) const;
+
+    Composition composition;
+    std::vector<double> radii; ///< of particles, in the unit
+    MixtureErrors errors;
+};
+
+/**
  * Points whose modes reach the same Nyquist wave number as n points do in the limit of a large box:
  * an even grid has lost its Nyquist plane, which stands for half a mode spacing.
  */
@@ -118,6 +173,17 @@ int effectivePoints(int n);
 /** Points that a window needs for an error: digits + 2. */
 int supportFor(double error);
 double shapeFor(double error, int support);
+
+/**
+ * Quadrature over theta in [-pi, pi], symmetric, with nodes crowded at 0, where the wave factor of
+ * a large box is peaked and plain Gauss-Legendre nodes are too far apart.
+ */
+Quadrature gradedBand(int nodes);
+/**
+ * Square of the wave number that stands for the missing mode k = 0 in estimates of sums over modes,
+ * and for those that pairs nearer than the extent do not tell from it [T14].
+ */
+double missingModes(const Lattice& box, double extent);
 
 } // namespace PSE::numerics
 

@@ -38,10 +38,8 @@ double inverseFourthPowers(const Lattice& box) {
     return sum;
 }
 
-/**
- * Quadrature over theta in [-pi, pi], symmetric, with nodes crowded at 0, where the wave factor of
- * a large box is peaked and plain Gauss-Legendre nodes are too far apart.
- */
+} // namespace
+
 Quadrature gradedBand(int nodes) {
     constexpr double CUBIC = 0.85;
     Quadrature rule = gaussLegendre(nodes, -1, 1);
@@ -53,7 +51,10 @@ Quadrature gradedBand(int nodes) {
     return rule;
 }
 
-} // namespace
+double missingModes(const Lattice& box, double extent) {
+    return std::pow(std::max(box.volume() / (8 * M_PI * inverseFourthPowers(box)), 3.751 / extent),
+                    2);
+}
 
 double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
                  int windowSupport, double windowShape, double phi, double extent) {
@@ -75,8 +76,7 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
         double(grid[0]) * grid[1] * grid[2] / box.volume() / (8 * M_PI * M_PI * M_PI);
     // Stands for the missing mode k = 0 and, in pairs, for those that the extent makes useless. The
     // self mobility goes without: that part is then on the safe side in small boxes.
-    const double damping =
-        std::pow(std::max(box.volume() / (8 * M_PI * inverseFourthPowers(box)), 3.751 / extent), 2);
+    const double damping = missingModes(box, extent);
     const double density = 3 * phi / (4 * M_PI);
     double pairs = 0, bias = 0;
     Matrix3 ripple = Matrix3::Zero();   // (direction of the ripple, component of the force)

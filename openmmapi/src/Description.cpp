@@ -3,6 +3,7 @@
 #include "openmmpse/internal/Units.h"
 #include <cmath>
 #include <iomanip>
+#include <set>
 #include <sstream>
 
 using std::endl;
@@ -55,7 +56,20 @@ void describeSplit(std::ostream& out, const NumericalParameters& p) {
     out << "split: " << p.split << " split" << (clause ? ", " : " (") << p.splitReason
         << (clause ? "" : ")");
     if (p.prolateBandwidth > 0)
-        out << ", range 1/xi = " << p.realCutoff << " nm, bandwidth " << p.prolateBandwidth;
+        out << ", range 1/xi = " << 1 / p.xi << " nm, bandwidth " << p.prolateBandwidth;
+    out << endl;
+}
+
+void describeRadii(std::ostream& out, const Scene& scene, const NumericalParameters& p) {
+    const std::set<double> distinct(scene.radii.begin(), scene.radii.end());
+    if (distinct.size() < 2)
+        return;
+    out << "unequal radii: " << distinct.size() << " distinct, from " << *distinct.begin() << " to "
+        << *distinct.rbegin() << " nm, because setParticleRadius was called";
+    if (p.radiusFunctions == static_cast<int>(distinct.size()))
+        out << "; each is a class of its own";
+    else if (p.radiusFunctions > 0)
+        out << "; pairs are interpolated by " << p.radiusFunctions << " functions of the radius";
     out << endl;
 }
 
@@ -101,6 +115,7 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
     out << "shear flow: off (shear rate 0)" << endl;
     out << "particles: " << scene.mobile.size() << " mobile, " << scene.numMassless
         << " massless (they do not move and are transparent to the fluid)" << endl;
+    describeRadii(out, scene, parameters);
     describeFluid(out, integrator, a);
     if (scene.hydrodynamics && !scene.mobile.empty()) {
         if (parameters.split != "none")

@@ -86,19 +86,6 @@ bool equalRadii(const Scene& scene) {
     return true;
 }
 
-void checkRadii(const Scene& scene) {
-    for (size_t i = 0; i < scene.radii.size(); i++)
-        if (scene.radii[i] != scene.radii[0]) {
-            std::ostringstream message;
-            message << "setParticleRadius: particle " << scene.mobile[i] << " has radius "
-                    << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has "
-                    << scene.radii[0] << " nm, and unequal radii are not available with "
-                    << "hydrodynamics; give all particles one radius, or use "
-                       "setMobilityModel(FreeDraining)";
-            refuse(message.str());
-        }
-}
-
 } // namespace
 
 Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
@@ -117,8 +104,6 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
         (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
     if (scene.hydrodynamics) {
         chooseBoundary(system, integrator, scene);
-        if (!scene.unbounded)
-            checkRadii(scene);
         scene.modelReason = string("Rotne-Prager-Yamakawa, ") +
                             (equalRadii(scene) ? "equal radii" : "unequal radii");
     } else

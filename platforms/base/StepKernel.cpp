@@ -4,6 +4,7 @@
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <sstream>
@@ -64,6 +65,27 @@ string readText(std::istream& stream, size_t limit) {
     return text;
 }
 
+/** FNV-1a over the bits of all numbers. */
+uint64_t hashOf(const std::vector<double>& values) {
+    uint64_t hash = 14695981039346656037u;
+    for (double value : values) {
+        uint64_t bits;
+        std::memcpy(&bits, &value, sizeof(bits));
+        for (int byte = 0; byte < 8; byte++)
+            hash = (hash ^ ((bits >> (8 * byte)) & 0xFF)) * 1099511628211u;
+    }
+    return hash;
+}
+
+string radiiInWords(const std::vector<double>& radii) {
+    std::ostringstream text;
+    text.precision(17);
+    text << "first radius " << (radii.empty() ? 0 : radii[0]) << " nm";
+    if (isMixture(radii))
+        text << " of unequal ones (checksum " << hashOf(radii) << ")";
+    return text.str();
+}
+
 void writeText(std::ostream& stream, const string& text) {
     write(stream, uint64_t(text.size()));
     stream.write(text.data(), text.size());
@@ -97,6 +119,7 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
         planUnbounded(integrator);
         return;
     }
+    requireServedRadii();
     const NumericalParameters& wish = integrator.getRequestedNumericalParameters();
     PlanOverrides overrides;
     overrides.xi = wish.xi;
@@ -111,6 +134,8 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
                                   scene.radii[0], integrator.getErrorTolerance(),
                                   integrator.getTemperature() > 0, 0, false, overrides,
                                   choiceOf(integrator.getSplit())});
+    if (isMixture(scene.radii))
+        request->radii = scene.radii;
     adapt(*request);
     plan(request->box);
 }
@@ -122,6 +147,22 @@ void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
     const UnboundedPlan made = makeUnboundedPlan(wanted, scene.radii);
     useUnbounded(made);
     unboundedPlan.reset(new UnboundedPlan(made));
+}
+
+void PlannedStepKernel::requireServedRadii() {
+    if (servesMixtures() || !isMixture(scene.radii))
+        return;
+    size_t i = 1;
+    while (scene.radii[i] == scene.radii[0])
+        i++;
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: particle " << scene.mobile[i] << " has radius "
+            << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has " << scene.radii[0]
+            << " nm, and unequal radii are not available with hydrodynamics on the "
+            << getPlatform().getName()
+            << " platform; use the Reference platform, give all particles one radius, or use "
+               "setMobilityModel(FreeDraining)";
+    throw OpenMMException(message.str());
 }
 
 Lattice PlannedStepKernel::currentBox() const {
@@ -194,11 +235,12 @@ NumericalParameters PlannedStepKernel::parametersOf(const Plan& plan) const {
     }
     if (!request)
         return p;
-    p.split = plan.split->name();
+    p.split = plan.splitName();
     p.xi = plan.xi;
     p.realCutoff = plan.realCutoff;
     p.prolateBandwidth = plan.bandwidth;
     p.splitReason = plan.splitReason;
+    p.radiusFunctions = plan.radiusFunctions;
     for (int d = 0; d < 3; d++)
         p.gridDimensions[d] = plan.grid[d];
     p.windowSupport = plan.windowSupport;
@@ -224,36 +266,18 @@ Plan PlannedStepKernel::planFor(const Lattice& box) const {
 }
 
 /** All radii, or where there are many what tells them from others. */
-string PlannedStepKernel::radiiInWords() const {
-    std::ostringstream text;
-    text.precision(17);
-    uint64_t digest = 14695981039346656037u; // FNV-1a over the bytes
-    bool equal = true;
-    for (double radius : scene.radii) {
-        equal = equal && radius == scene.radii[0];
-        unsigned char bytes[sizeof(double)];
-        std::memcpy(bytes, &radius, sizeof(double));
-        for (unsigned char byte : bytes)
-            digest = (digest ^ byte) * 1099511628211u;
-    }
-    text << "first radius " << (scene.radii.empty() ? 0 : scene.radii[0]) << " nm";
-    if (!equal)
-        text << ", radii of digest " << std::hex << digest;
-    return text.str();
-}
-
 string PlannedStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
     text.precision(17);
     text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining")
          << (scene.unbounded ? ", unbounded" : "") << ", viscosity " << viscosity << " Da/(nm ps), "
-         << radiiInWords() << ", particles " << scene.mobile.size() << " of " << masses.size()
-         << ", split " << p.split << ", xi " << p.xi << " /nm, real-space cutoff " << p.realCutoff
-         << " nm, prolate bandwidth " << p.prolateBandwidth << ", grid " << p.gridDimensions[0]
-         << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2] << ", window support "
-         << p.windowSupport << ", window shape " << p.windowShape << ", Lanczos tolerance "
-         << p.lanczosTolerance << ", " << p.precision << " precision";
+         << radiiInWords(scene.radii) << ", particles " << scene.mobile.size() << " of "
+         << masses.size() << ", split " << p.split << ", xi " << p.xi << " /nm, real-space cutoff "
+         << p.realCutoff << " nm, prolate bandwidth " << p.prolateBandwidth << ", grid "
+         << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
+         << ", window support " << p.windowSupport << ", window shape " << p.windowShape
+         << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision";
     return text.str();
 }
 

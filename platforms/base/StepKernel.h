@@ -65,9 +65,11 @@ protected:
     virtual void useUnbounded(const numerics::UnboundedPlan& plan) = 0;
     /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
     virtual void useFreeDraining() = 0;
+    /** Whether useEngine() can use a Plan for unequal radii. */
+    virtual bool servesMixtures() const { return false; }
     /** Of the last thermal step. */
     virtual int lanczosIterations() const = 0;
-    /** As getNumericalParameters() tells it; without a Plan, plan.split is NULL. */
+    /** As getNumericalParameters() tells it; without a Plan, it has no split. */
     virtual std::string precisionName(const numerics::Plan& plan) const = 0;
     virtual std::string precisionName(const numerics::UnboundedPlan& plan) const = 0;
     /** Relative rounding of a coordinate of the Context. */
@@ -100,8 +102,9 @@ private:
     numerics::Plan planFor(const numerics::Lattice& box) const;
     void plan(const numerics::Lattice& box);
     void planUnbounded(const PSEBrownianIntegrator& integrator);
+    /** @throws OpenMMException naming two unequal radii, if the platform cannot do them */
+    void requireServedRadii();
     NumericalParameters parametersOf(const numerics::Plan& plan) const;
-    std::string radiiInWords() const;
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
     std::string signature(const numerics::Plan& plan) const;
 

@@ -42,7 +42,8 @@ void HostStepKernel::useFreeDraining() {
 }
 
 string HostStepKernel::precisionName(const Plan& plan) const {
-    return plan.split && plan.precision == Precision::Single ? "single" : "double";
+    return (plan.split || plan.mixture) && plan.precision == Precision::Single ? "single"
+                                                                               : "double";
 }
 
 string HostStepKernel::precisionName(const UnboundedPlan& plan) const {

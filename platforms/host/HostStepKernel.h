@@ -32,6 +32,7 @@ protected:
     void adapt(numerics::UnboundedRequest& request) const override { factory->adapt(request); }
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void useFreeDraining() override;
+    bool servesMixtures() const override { return factory->servesMixtures(); }
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan& plan) const override;
     std::string precisionName(const numerics::UnboundedPlan& plan) const override;

@@ -2,6 +2,7 @@
 #include "ReferenceEngine.h"
 #include "LanczosSpace.h"
 #include "numerics/Lanczos.h"
+#include "numerics/SphericalBessel.h"
 #include "openmm/OpenMMException.h"
 #include <algorithm>
 #include <cmath>
@@ -14,9 +15,20 @@ namespace PSE {
 ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double viscosity,
                                  const std::vector<int>& indices, StageClock& clock)
     : plan(plan), box(box), viscosity(viscosity), selfMobility(1 / (6 * M_PI * viscosity * plan.a)),
-      indices(indices), clock(clock),
-      table(makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError)) {
+      indices(indices), clock(clock) {
+    prepareRealHalf();
     listModes();
+}
+
+void ReferenceEngine::prepareRealHalf() {
+    if (!plan.mixture) {
+        table = makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError);
+        realSelf.assign(indices.size(), table.self);
+        return;
+    }
+    mixtureTable.reset(new MixtureTable(*plan.mixture, plan.tableError));
+    for (double a : plan.mixture->particleRadii())
+        realSelf.push_back(mixtureTable->self(a));
 }
 
 void ReferenceEngine::listModes() {
@@ -29,10 +41,13 @@ void ReferenceEngine::listModes() {
                 if (!isCanonicalMode(n1, n2, n3))
                     continue;
                 const Vec3 k = waves * Vec3(n1, n2, n3);
-                const double weight = plan.split->waveWeight(k.norm() * plan.a);
+                const double reduced = k.norm() * plan.a;
+                const double weight = plan.mixture ? plan.mixture->envelope(reduced)
+                                                   : plan.split->waveWeight(reduced);
                 if (weight > 0)
                     modes.push_back({{n1, n2, n3},
                                      k.normalized(),
+                                     reduced,
                                      weight / (viscosity * box.volume() * k.squaredNorm())});
             }
 }
@@ -53,11 +68,22 @@ void ReferenceEngine::setPositions(const std::vector<Vec3>& x) {
 
 void ReferenceEngine::addPair(int i, int j, const Vec3& d) {
     const Vec3 reduced = d / plan.a;
-    const double r = reduced.norm();
-    if (r >= table.rc)
-        return;
-    const SmoothScalars s = table(r);
-    pairs.push_back({i, j, reduced, s.F, s.C});
+    SmoothScalars s;
+    if (realPair(i, j, reduced.norm(), s))
+        pairs.push_back({i, j, reduced, s.F, s.C});
+}
+
+bool ReferenceEngine::realPair(int i, int j, double r, SmoothScalars& scalars) const {
+    if (!plan.mixture) {
+        if (r < table.rc)
+            scalars = table(r);
+        return r < table.rc;
+    }
+    const std::vector<double>& radii = plan.mixture->particleRadii();
+    if (r >= plan.mixture->range(radii[i], radii[j]))
+        return false;
+    scalars = (*mixtureTable)(r, radii[i], radii[j]);
+    return true;
 }
 
 /** All pairs, one by one: cheap beside the sums over modes, and evidently complete in any box. */
@@ -101,7 +127,7 @@ complex<double> ReferenceEngine::phase(int particle, const Mode& mode) const {
 
 void ReferenceEngine::multiplyReal(const Vectors& v, Vectors& out) const {
     for (size_t i = 0; i < v.size(); i++)
-        out[i] = table.self * v[i];
+        out[i] = realSelf[i] * v[i];
     for (const Pair& p : pairs) {
         out[p.i] += p.F * v[p.j] + p.C * p.d.dot(v[p.j]) * p.d;
         // An image of the particle itself is listed with its opposite: once is enough.
@@ -139,6 +165,8 @@ void ReferenceEngine::addWaves(const Vectors* forces, const Thermal* thermal, Ve
         Eigen::Vector3cd wave = Eigen::Vector3cd::Zero();
         for (int i = 0; i < n; i++) {
             e[i] = phase(i, mode);
+            if (plan.mixture) // a sphere feels the mean of the wave over its surface
+                e[i] *= sinc(mode.k * plan.mixture->particleRadii()[i]);
             if (forces != NULL)
                 wave += mode.B * std::conj(e[i]) * (*forces)[i];
         }

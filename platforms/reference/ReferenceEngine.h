@@ -7,6 +7,7 @@
 // use it up to about 1000 particles.
 
 #include "MobilityEngine.h"
+#include "numerics/MixtureTable.h"
 #include "numerics/RealTable.h"
 #include <complex>
 
@@ -33,9 +34,13 @@ private:
     struct Mode {
         int n[3];
         numerics::Vec3 direction; ///< k/|k|
-        double B;                 ///< wave factor w/(eta V k^2)
+        double k;                 ///< in 1/a
+        double B;                 ///< wave factor w/(eta V k^2); of a mixture without its sincs
     };
 
+    void prepareRealHalf();
+    /** Real-space scalars of a pair at a distance in units of a; false beyond its range. */
+    bool realPair(int i, int j, double r, numerics::SmoothScalars& scalars) const;
     void listModes();
     void addPair(int i, int j, const numerics::Vec3& d);
     void listNeighbours();
@@ -52,9 +57,11 @@ private:
     double viscosity, selfMobility; ///< selfMobility: 1/(6 pi eta a)
     std::vector<int> indices;
     StageClock& clock;
-    numerics::RealTable table;
-    std::vector<Mode> modes; ///< one of each pair n, -n
-    Vectors positions;       ///< in the primary box
+    numerics::RealTable table;                                  ///< of equal spheres
+    std::unique_ptr<const numerics::MixtureTable> mixtureTable; ///< of unequal ones
+    std::vector<double> realSelf;                               ///< diagonal of M_R, by particle
+    std::vector<Mode> modes;                                    ///< one of each pair n, -n
+    Vectors positions;                                          ///< in the primary box
     /// each unordered pair (and image) once; i == j for images of a particle itself
     std::vector<Pair> pairs;
     /** phases[d][particle*(2 R + 1) + R + n] = exp(i 2 pi n s_d), R = M_d/2. */

@@ -23,8 +23,10 @@ struct Scene;
 struct OPENMM_EXPORT_PSE NumericalParameters {
     /// name of the real/wave split: "Prolate" or "Hasimoto", or "none" without one
     std::string split;
-    double xi = 0;         ///< splitting parameter (in 1/nm); of the prolate split 1/realCutoff
-    double realCutoff = 0; ///< range of the real-space half (in nm)
+    /// splitting parameter (in 1/nm); of the prolate split 1/realCutoff, of unequal spheres 1 over
+    /// what is left of it without the two largest radii
+    double xi = 0;
+    double realCutoff = 0; ///< range of the real-space half (in nm), of unequal spheres the largest
     /// bandwidth c of the prolate split, in [3, 30] (dimensionless); 0 for another split
     double prolateBandwidth = 0;
     int gridDimensions[3] = {0, 0, 0}; ///< grid points along the three box vectors
@@ -39,6 +41,8 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
     /// seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
     int randomSeed = 0;
     std::string splitReason; ///< why this split, in the words of describe() (never set)
+    /// functions of the radius behind pairs of unequal spheres, 0 for equal ones (never set)
+    int radiusFunctions = 0;
 };
 
 /**

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: MIT
+#include "numerics/MixtureTable.h"
+#include "numerics/PlanCost.h"
+#include "numerics/PlanFamily.h"
+#include "numerics/ProlateSplit.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace PSE::numerics {
+
+namespace {
+
+/// of the tolerance, for both halves
+constexpr double BUDGET = 0.8;
+/// of that for what the envelope drops or the real half leaves out, the rest for the grid
+constexpr double DROPPED_SHARE = 0.6;
+constexpr double BANDWIDTH_STEP = 1.0 / 64; ///< as ProlatePlans
+/// from one range to the next, and the smallest, in radii of the smallest sphere
+constexpr double RANGE_FACTOR = 1.08, SMALLEST_RANGE = 1;
+/// in widths of the box, where pairs are summed over images
+constexpr double WIDEST_RANGE = 2;
+/// Hasimoto's: from one xi to the next, and xi times the range between which that is sought
+constexpr double XI_FACTOR = 1.25, SMALLEST_REACH = 0.5, LARGEST_REACH = 7.5;
+/// beta per support: with the shells of spheres, narrower windows serve
+constexpr double SHAPE_PER_SUPPORT = 2.05;
+/// Nyquist wave number over that of the band, in the closed rule that ranks ranges
+constexpr double FINER = 1.06;
+/// of radial windows, in the volume-averaged radius: see PlanFamily
+constexpr double LARGEST_EXTENT = 12;
+constexpr double SINGLE_ROUNDING = 6e-8, DOUBLE_ROUNDING = 1.2e-16;
+/// of the tolerance, for what Horner's rule makes of rounding
+constexpr double ROUNDING_SHARE = 0.1;
+constexpr double UNAFFORDABLE = 1e50;
+
+std::vector<double> inUnits(const std::vector<double>& radii, double unit) {
+    std::vector<double> reduced;
+    for (double a : radii)
+        reduced.push_back(a / unit);
+    return reduced;
+}
+
+} // namespace
+
+MixturePlans::MixturePlans(const PlanRequest& request)
+    : PlanFamily(request, BUDGET), composition(inUnits(request.radii, request.radius)),
+      radii(inUnits(request.radii, request.radius)),
+      errors(composition, box, phi,
+             std::min(extent, LARGEST_EXTENT *
+                                  std::cbrt(composition.volume() / composition.particles()))) {}
+
+double MixturePlans::unitRadius(const std::vector<double>& radii) {
+    double squares = 0;
+    for (double a : radii)
+        squares += 1 / (a * a);
+    return std::sqrt(radii.size() / squares);
+}
+
+RadialWindow MixturePlans::windowOf(const Plan& plan) const {
+    return RadialWindow(plan.windowSupport, plan.windowShape,
+                        RadialWindow::spacing(box, plan.grid));
+}
+
+double MixturePlans::waveErrorOf(const Plan& plan) const {
+    const RadialWindow window = windowOf(plan);
+    return errors.wave(*plan.mixture, plan.grid, &window);
+}
+
+double MixturePlans::realErrorOf(const Plan& plan) const {
+    return errors.realTruncation(*plan.mixture);
+}
+
+Magnification MixturePlans::magnificationOf(const Plan& plan) const {
+    return errors.magnification(*plan.mixture, plan.grid, windowOf(plan));
+}
+
+std::vector<int> MixturePlans::supports() const {
+    if (request.overrides.windowSupport > 0)
+        return {request.overrides.windowSupport};
+    return {supportFor(error) - 1, supportFor(error)};
+}
+
+double MixturePlans::shapeOf(int support) const {
+    return SHAPE_PER_SUPPORT * support;
+}
+
+/** Ordered pairs in range, by R. */
+double MixturePlans::pairsOf(double R, bool sumImages) const {
+    double pairs = 0;
+    for (int i = 0; i < composition.size(); i++)
+        for (int j = 0; j < composition.size(); j++)
+            pairs += composition.counts[i] *
+                     meanNeighbours(box, composition.counts[j],
+                                    R + composition.radii[i] + composition.radii[j]);
+    if (sumImages) { // all pairs in every image cell that the range touches
+        const double n = composition.particles(), widest = R + largestDiameter();
+        pairs += 0.5 * n * n * std::pow(1 + 2 * widest / std::cbrt(box.volume()), 3);
+    }
+    return pairs;
+}
+
+double MixturePlans::cost(const Plan& plan) const {
+    const double pairs = pairsOf(plan.mixture->shape().range(), plan.sumImages);
+    if (request.directSums)
+        return CostModel::directStep(composition.particles(), plan.gridPoints(), pairs, products());
+    const RadialWindow window = windowOf(plan);
+    const double density = plan.gridPoints() / box.volume();
+    double touched = 0;
+    for (int i = 0; i < composition.size(); i++) {
+        const double outer = window.reach(composition.radii[i]),
+                     inner = std::max(0.0, composition.radii[i] - window.radius());
+        touched += composition.counts[i] * density * 4 * M_PI / 3 *
+                   (outer * outer * outer - inner * inner * inner);
+    }
+    return touched * CostModel::SPREAD_RADIAL +
+           CostModel::step(0, plan.gridPoints(), 0, pairs, products());
+}
+
+double MixturePlans::givenRange() const {
+    const PlanOverrides& wish = request.overrides;
+    const double fromCutoff = wish.realCutoff / request.radius - largestDiameter();
+    if (wish.realCutoff > 0 && !(fromCutoff > 0)) {
+        std::ostringstream message;
+        message << "real-space cutoff " << wish.realCutoff
+                << " nm is not above the distance of two touching particles of the largest radius, "
+                << largestDiameter() * request.radius
+                << " nm; leave the cutoff 0 for the automatic one";
+        throw std::invalid_argument(message.str());
+    }
+    if (!isProlate() || wish.xi == 0)
+        return wish.realCutoff > 0 ? fromCutoff : 0;
+    const double R = 1 / (wish.xi * request.radius);
+    if (wish.realCutoff > 0 &&
+        std::fabs(R - fromCutoff) > 1e-9 * wish.realCutoff / request.radius) {
+        std::ostringstream message;
+        message << "the prescribed splitting parameter " << wish.xi << " /nm and real-space cutoff "
+                << wish.realCutoff
+                << " nm are not those of one prolate range (cutoff = 1/xi + twice the largest "
+                   "radius); prescribe one of them";
+        throw std::invalid_argument(message.str());
+    }
+    return R;
+}
+
+double MixturePlans::bandwidthFor(double R) const {
+    if (request.overrides.bandwidth > 0)
+        return request.overrides.bandwidth;
+    const auto suffices = [&](double c) {
+        return errors.dropped(ProlateEnvelope(c, R)) <= DROPPED_SHARE * error;
+    };
+    int low = static_cast<int>(ProlateSplit::SMALLEST_BANDWIDTH / BANDWIDTH_STEP) - 1,
+        high = static_cast<int>(ProlateSplit::LARGEST_BANDWIDTH / BANDWIDTH_STEP);
+    while (high - low > 1) {
+        const int mid = (low + high) / 2;
+        (suffices(mid * BANDWIDTH_STEP) ? high : low) = mid;
+    }
+    return high * BANDWIDTH_STEP;
+}
+
+/** With the smallest range that keeps its share, or the one prescribed. */
+std::shared_ptr<const Mixture> MixturePlans::hasimotoMixture(double xi) const {
+    const auto with = [&](double R) {
+        return std::make_shared<const Mixture>(std::make_shared<HasimotoEnvelope>(xi, R), radii);
+    };
+    const double given = givenRange();
+    if (given > 0)
+        return with(given);
+    double low = SMALLEST_REACH / xi, high = LARGEST_REACH / xi;
+    while (high - low > 0.01 * high) {
+        const double mid = 0.5 * (low + high);
+        (errors.realTruncation(*with(mid)) > DROPPED_SHARE * error ? low : high) = mid;
+    }
+    return with(high);
+}
+
+double MixturePlans::unitOf(const Plan& plan) const {
+    return isProlate() ? plan.bandwidth / plan.mixture->shape().range()
+                       : 2 * plan.xi * plan.a * std::sqrt(std::log(1 / error));
+}
+
+Plan MixturePlans::at(double parameter) const {
+    const PlanOverrides& wish = request.overrides;
+    Plan plan = {};
+    plan.a = request.radius;
+    if (isProlate()) {
+        plan.xi = (wish.xi > 0 ? wish.xi : 1 / (parameter * plan.a));
+        const double R = 1 / (plan.xi * plan.a); // of the very number that is reported
+        plan.bandwidth = bandwidthFor(R);
+        plan.mixture = std::make_shared<const Mixture>(
+            std::make_shared<ProlateEnvelope>(plan.bandwidth, R), radii);
+    } else {
+        plan.xi = (wish.xi > 0 ? wish.xi : parameter / plan.a);
+        plan.mixture = hasimotoMixture(plan.xi * plan.a);
+        // and of the cut-off that is reported
+        const double cutoff = plan.a * plan.mixture->largestRange();
+        plan.mixture = std::make_shared<const Mixture>(
+            std::make_shared<HasimotoEnvelope>(plan.xi * plan.a,
+                                               cutoff / plan.a - largestDiameter()),
+            radii);
+    }
+    plan.realCutoff =
+        (wish.realCutoff > 0 ? wish.realCutoff : plan.a * plan.mixture->largestRange());
+    completeRealHalf(plan);
+    plan.windowSupport = supports().front();
+    plan.windowShape = (wish.windowShape > 0 ? wish.windowShape : shapeOf(plan.windowSupport));
+    plan.grid = (wish.grid[0] > 0 ? wish.grid : gridFor(FINER * unitOf(plan), plan.windowSupport));
+    return plan;
+}
+
+Plan MixturePlans::cheapest() const {
+    const PlanOverrides& wish = request.overrides;
+    const bool prolate = isProlate();
+    const double given = (prolate ? givenRange() : wish.xi * request.radius);
+    if (given > 0)
+        return at(given);
+    const double width = box.smallestWidth(), smallest = composition.radii.front();
+    // From the shortest range on: a wider one only if it is cheaper.
+    const double first = (prolate ? SMALLEST_RANGE * smallest : 4 / smallest),
+                 last = WIDEST_RANGE * width;
+    Plan best = {};
+    double lowest = std::numeric_limits<double>::infinity();
+    for (double x = first; prolate ? x < last || x == first : x > 1 / last;
+         x *= prolate ? RANGE_FACTOR : 1 / XI_FACTOR) {
+        Plan plan = at(x);
+        double price = cost(plan);
+        if (wish.grid[0] > 0) { // it serves only some ranges; else the smallest error is best
+            plan = finished(plan, unitOf(plan));
+            price = cost(plan);
+            if (plan.predictedError > request.tolerance)
+                price = plan.predictedError * UNAFFORDABLE;
+        }
+        if (price < lowest) {
+            lowest = price;
+            best = plan;
+        }
+        if (wish.grid[0] == 0 &&
+            CostModel::step(0, 0, 0, pairsOf(plan.mixture->shape().range(), false), products()) >
+                lowest)
+            break;
+    }
+    return best;
+}
+
+void MixturePlans::requireTolerance(const Plan& plan) const {
+    if (request.overrides.grid[0] != 0 || plan.predictedError <= request.tolerance)
+        return;
+    const double real = realErrorOf(plan);
+    std::ostringstream message;
+    if (real > 0.5 * request.tolerance && isProlate())
+        message << "a prolate bandwidth of " << plan.bandwidth << " leaves an error of " << real
+                << " with these radii, the tolerance is " << request.tolerance
+                << "; prescribe a larger bandwidth (at most " << ProlateSplit::LARGEST_BANDWIDTH
+                << "), or 0 for the automatic one, or loosen the tolerance";
+    else if (real > 0.5 * request.tolerance)
+        message << "splitting parameter " << plan.xi << " /nm and real-space cutoff "
+                << plan.realCutoff << " nm leave an error of " << real
+                << " in the real half, the tolerance is " << request.tolerance
+                << "; choose a larger splitting parameter or cutoff, or 0 for the automatic ones";
+    else
+        message << windowRefusal(plan, plan.predictedError);
+    throw std::invalid_argument(message.str());
+}
+
+void MixturePlans::checkTables(Plan& plan) const {
+    const MixtureTable table(*plan.mixture, plan.tableError);
+    plan.radiusFunctions = table.size();
+    const double limit = ROUNDING_SHARE * request.tolerance;
+    if (SINGLE_ROUNDING * table.magnification() > limit)
+        plan.precision = Precision::Double;
+    const bool single = request.singleOnly && plan.precision == Precision::Double,
+               coarse = !request.directSums && DOUBLE_ROUNDING * table.magnification() > limit;
+    if (!single && !coarse)
+        return;
+    std::ostringstream message;
+    message << "radii from " << composition.radii.front() * plan.a << " to "
+            << composition.radii.back() * plan.a << " nm within a range of " << plan.realCutoff
+            << " nm make sums of polynomials that magnify rounding by " << table.magnification()
+            << ", too much for tolerance " << request.tolerance << " in "
+            << (coarse ? "double" : "single") << " precision; "
+            << (coarse ? "" : "use the platform's mixed or double precision, ")
+            << "use radii that differ less, or a looser tolerance";
+    throw std::invalid_argument(message.str());
+}
+
+Plan MixturePlans::best() const {
+    Plan plan = cheapest();
+    checkPlan(plan, request);
+    plan = finished(plan, unitOf(plan));
+    plan.windowSpacing = RadialWindow::spacing(box, plan.grid);
+    plan.splitReason = (request.split == SplitChoice::Automatic ? "default" : "as prescribed");
+    requireTolerance(plan);
+    checkTables(plan);
+    return plan;
+}
+
+} // namespace PSE::numerics
