@@ -222,14 +222,15 @@ TEST_P(CppApi, RefusalNamesTheSetter) {
     System system = cubicSystem(2);
     PSEBrownianIntegrator integrator(300, ETA, RADIUS, 0.1);
     integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
-    integrator.setParticleRadius(1, 2.0);
+    integrator.setParticleRadius(2, 2.0); // there are particles 0 and 1
     try {
         Context context(system, integrator, platform());
-        FAIL() << "unequal radii were accepted";
+        FAIL() << "a radius of no particle was accepted";
     } catch (const OpenMMException& refusal) {
         EXPECT_NE(string(refusal.what()).find("setParticleRadius"), string::npos) << refusal.what();
     }
-    integrator.setParticleRadius(1, RADIUS); // the same integrator can be put right
+    system.addParticle(1.0); // the same integrator can be used where the particle exists
+    integrator.setParticleRadius(2, RADIUS);
     Context context(system, integrator, platform());
 }
 

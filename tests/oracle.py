@@ -16,6 +16,9 @@ tensor minus the integral of the wave part, for every r >= 0. That integral is
 an entire function of r^2; written with the Boys functions F_m(t) = int_0^1 u^2m exp(-t u^2) du it
 has neither a branch nor a cancellation at small r. Overlaps, coincident particles, a particle's own
 images and boxes smaller than a particle need no special case. Absolute error <= 1e-12 mu0.
+
+For two radii a^2 is (ai^2 + aj^2)/2 in both, which is the exact tensor of spheres that are apart;
+what overlap makes of it is left to the free-space tensor. Units are then 1/(6 pi eta).
 """
 import itertools
 
@@ -56,6 +59,27 @@ def freeSpaceRpy(r, a):
     return perp, par
 
 
+def freeSpaceScalars(r, ai, aj):
+    """
+    The same between spheres of radii ai and aj (broadcast against r), in units of 1/(6 pi eta) and
+    1/nm: P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), whose
+    scalars of 1 and rr are added up here.
+    """
+    r, ai, aj = np.broadcast_arrays(np.asarray(r, dtype=float), ai, aj)
+    large, small = np.maximum(ai, aj), np.minimum(ai, aj)
+    far = np.maximum(r, ai + aj)
+    squares = (ai**2 + aj**2)/far**2
+    isotropic, dyadic = 3/(4*far)*(1 + squares/3), 3/(4*far)*(1 - squares)
+    near = np.where((r > large - small) & (r < ai + aj), r, ai + aj)
+    gap = (ai - aj)**2
+    partIsotropic = (16*near**3*(ai + aj) - (gap + 3*near**2)**2)/(32*near**3)/(ai*aj)
+    partDyadic = 3*(gap - near**2)**2/(32*near**3)/(ai*aj)
+    inside, apart = r <= large - small, r >= ai + aj
+    one = np.where(apart, isotropic, np.where(inside, 1/large, partIsotropic))
+    rr = np.where(apart, dyadic, np.where(inside, 0, partDyadic))
+    return one, one + rr
+
+
 def waveIntegral(r, a, xi):
     """Scalars (perp, par) of W(r), the infinite-box integral of the wave part, in units of mu0."""
     t = (xi*np.asarray(r, dtype=float))**2
@@ -81,11 +105,13 @@ def latticeVectorsWithin(box, radius):
     return vectors[np.linalg.norm(vectors, axis=1) <= reach]
 
 
-def realSpacePart(positions, box, a, xi):
-    """Sum of RPY - W over all images within REACH/xi, as (N,3,N,3), in units of mu0."""
+def realSpacePart(positions, box, radii, xi):
+    """Sum of RPY - W over all images within REACH/xi, as (N,3,N,3), in units of 1/(6 pi eta)."""
     N = len(positions)
-    rc = max(REACH/xi, 2*a)
+    rc = max(REACH/xi, 2*radii.max())
     first, second = np.triu_indices(N)
+    ai, aj = radii[first], radii[second]
+    both = np.sqrt(0.5*(ai**2 + aj**2))
     fractional = (positions[first] - positions[second]) @ np.linalg.inv(box)
     nearest = (fractional - np.rint(fractional)) @ box
     blocks = np.zeros((len(first), 3, 3))
@@ -97,9 +123,9 @@ def realSpacePart(positions, box, a, xi):
             continue
         d = distance[near]
         unit = r[near]/np.maximum(d, 1e-300)[:, None]
-        freePerp, freePar = freeSpaceRpy(d, a)
-        wavePerp, wavePar = waveIntegral(d, a, xi)
-        perp, par = freePerp - wavePerp, freePar - wavePar
+        freePerp, freePar = freeSpaceScalars(d, ai[near], aj[near])
+        wavePerp, wavePar = waveIntegral(d, both[near], xi)
+        perp, par = freePerp - wavePerp/both[near], freePar - wavePar/both[near]
         blocks[near] += perp[:, None, None]*np.eye(3)
         blocks[near] += ((par - perp)[:, None, None]*unit[:, :, None]*unit[:, None, :])
     M = np.zeros((N, 3, N, 3))
@@ -119,44 +145,50 @@ def waveVectorsWithin(box, cutoff):
     return k[np.einsum("ij,ij->i", k, k) <= cutoff**2]
 
 
-def wavePart(positions, box, a, xi):
-    """The sum over wave vectors, as (N,3,N,3), in units of mu0."""
+def wavePart(positions, box, radii, xi):
+    """The sum over wave vectors, as (N,3,N,3), in units of 1/(6 pi eta)."""
     N = len(positions)
     k = waveVectorsWithin(box, 2*REACH*xi)
     k2 = np.einsum("ij,ij->i", k, k)
     x = k2/(4*xi**2)
     # Twice, because -k is not in the list.
-    weight = 2*6*np.pi*a/boxVolume(box)*(1 - a*a*k2/3)*(1 + x + 2*x*x)*np.exp(-x)/k2
+    weight = 2*6*np.pi/boxVolume(box)*(1 + x + 2*x*x)*np.exp(-x)/k2
+    squares = (radii**2/6)[:, None] + (radii**2/6)[None, :]
     phase = positions @ k.T
     waves = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
     M = np.zeros((N, 3, N, 3))
     for i in range(3):
         for j in range(i, 3):
             w = weight*((i == j) - k[:, i]*k[:, j]/k2)
-            M[:, i, :, j] = M[:, j, :, i] = (waves*np.concatenate([w, w])) @ waves.T
+            M[:, i, :, j] = M[:, j, :, i] = (
+                (waves*np.tile(w, 2)) @ waves.T - squares*((waves*np.tile(w*k2, 2)) @ waves.T))
     return M
 
 
 def mobilityMatrix(positions, box, a, viscosity=None, xi=None):
     """
-    The mobility M of N equal spheres in a periodic fluid with zero mean flow.
+    The mobility M of N spheres in a periodic fluid with zero mean flow.
 
     positions  (N,3) in nm, anywhere
     box        (3,3), rows are the box vectors in nm; any three independent vectors
-    a          hydrodynamic radius in nm
-    viscosity  in Da/(nm ps); without it the result is in units of 1/(6 pi eta a)
+    a          hydrodynamic radius in nm, of all or (N,) of each
+    viscosity  in Da/(nm ps); without it the result is in units of 1/(6 pi eta a), or, for (N,)
+               radii, 1/(6 pi eta) and 1/nm
     xi         splitting parameter in 1/nm; the result does not depend on it
     returns    (3N,3N), row 3*i + component
     """
     positions = np.asarray(positions, dtype=float).reshape(-1, 3)
     box = np.asarray(box, dtype=float)
+    N = len(positions)
+    radii = np.broadcast_to(np.asarray(a, dtype=float), N)
     if xi is None:
         # Above 0.9/a the two parts grow like (a xi)^3 and cancel; 4/V^(1/3) balances the two costs.
-        xi = min(4/boxVolume(box)**(1/3), 0.9/a)
-    N = len(positions)
-    M = realSpacePart(positions, box, a, xi) + wavePart(positions, box, a, xi)
+        xi = min(4/boxVolume(box)**(1/3), 0.9/radii.max())
+    M = realSpacePart(positions, box, radii, xi) + wavePart(positions, box, radii, xi)
     M = M.reshape(3*N, 3*N)
-    return M if viscosity is None else M/(6*np.pi*viscosity*a)
+    if viscosity is not None:
+        return M/(6*np.pi*viscosity)
+    return M if np.ndim(a) else M*a
 
 
 def freeSpaceScalars(r, ai, aj):

@@ -52,10 +52,14 @@ def scaledToVolume(box, volume):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Equal spheres of one radius (nm) at positions (N,3) (nm) in a box with row vectors (nm)."""
+    """
+    Spheres at positions (N,3) (nm) in a box with row vectors (nm), of one radius (nm), or each of
+    its own of `radii` (N,).
+    """
     positions: np.ndarray
     box: np.ndarray
     radius: float
+    radii: np.ndarray = None
 
     @property
     def count(self):
@@ -66,22 +70,28 @@ class Scene:
         """Mobility of one sphere in infinite solvent, nm/ps per kJ/(mol nm)."""
         return 1/(6*np.pi*ETA*self.radius)
 
+    @property
+    def ownMobilities(self):
+        """The same of each, to be multiplied with forces (N,3)."""
+        return self.mu0 if self.radii is None else 1/(6*np.pi*ETA*self.radii[:, None])
+
     @functools.cached_property
     def mobility(self):
         """The oracle's M (3N,3N), in nm/ps per kJ/(mol nm)."""
-        return mobilityMatrix(self.positions, self.box, self.radius, ETA)
+        a = self.radius if self.radii is None else self.radii
+        return mobilityMatrix(self.positions, self.box, a, ETA)
 
     def velocities(self, forces):
         return (self.mobility @ np.ravel(forces)).reshape(-1, 3)
 
     def moved(self, shifts):
-        return Scene(self.positions + shifts, self.box, self.radius)
+        return Scene(self.positions + shifts, self.box, self.radius, self.radii)
 
     def at(self, positions):
         """The same spheres elsewhere; asked again for the same place, the same Scene."""
         key = np.asarray(positions).tobytes()
         if key not in self.elsewhere:
-            self.elsewhere[key] = Scene(positions, self.box, self.radius)
+            self.elsewhere[key] = Scene(positions, self.box, self.radius, self.radii)
         return self.elsewhere[key]
 
     @functools.cached_property
@@ -138,6 +148,24 @@ def idealGas(N, phi, box, radius, seed):
     """Independent uniform positions: any overlap occurs."""
     box = scaledToVolume(np.asarray(box, dtype=float), N*4*np.pi/3*radius**3/phi)
     return Scene(np.random.default_rng(seed).random((N, 3)) @ box, box, radius)
+
+
+def mixture(radii, phi, box, seed, apart=False):
+    """
+    Spheres of these radii at independent uniform positions (any overlap and nesting occurs), or
+    apart from each other, the largest placed first; box gives only the shape.
+    """
+    rng = np.random.default_rng(seed)
+    radii = np.asarray(radii, dtype=float)
+    box = scaledToVolume(np.asarray(box, dtype=float), 4*np.pi/3*np.sum(radii**3)/phi)
+    positions = rng.random((len(radii), 3)) @ box
+    placed = []
+    for i in np.argsort(-radii, kind="stable") if apart else ():
+        while placed and np.any(np.linalg.norm(nearestImages(positions[placed] - positions[i], box), axis=1)
+                                < radii[placed] + radii[i]):
+            positions[i] = rng.random(3) @ box
+        placed.append(i)
+    return Scene(positions, box, radii[0], radii)
 
 
 def chain(N, bond, L, radius, seed):
@@ -238,6 +266,8 @@ def makeContext(scene, platformName, temperature=0.0, stepSize=1.0, tolerance=No
     """
     integrator = openmmpse.PSEBrownianIntegrator(temperature, ETA, scene.radius, stepSize)
     integrator.setFluidBoundary(boundary)
+    for i, a in enumerate([] if scene.radii is None else scene.radii):
+        integrator.setParticleRadius(i, float(a))
     integrator.setRandomNumberSeed(seed)
     if tolerance is not None:
         integrator.setErrorTolerance(tolerance)
@@ -283,7 +313,7 @@ def mobilityColumns(integrator, N):
 
 def errorRatio(velocities, exact, forces, scene):
     """Error of M f in the norm of the contract: to be compared with the tolerance."""
-    scale = max(np.linalg.norm(exact), np.linalg.norm(forces)*scene.mu0)
+    scale = max(np.linalg.norm(exact), np.linalg.norm(forces*scene.ownMobilities))
     return np.linalg.norm(velocities - exact)/scale
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from oracle import boxVolume, freeSpaceMobilityMatrix, freeSpaceRpy, mobilityMatrix, waveIntegral
+from oracle import (boxVolume, freeSpaceMobilityMatrix, freeSpaceRpy, freeSpaceScalars,
+                    mobilityMatrix, waveIntegral)
 
 ACCURACY = 1e-12
 CUBIC = 2.8372974794806
@@ -111,3 +112,37 @@ def testReplicatedCell():
     doubledBox[1] *= 2
     doubled = mobilityMatrix(np.vstack([positions, positions + box[1]]), doubledBox, a)
     assert abs(doubled @ np.tile(forces.ravel(), 2) - np.tile(single, 2)).max() < ACCURACY
+
+
+def testUnequalSpheresAreAveragedOverTheirSurfaces():
+    """
+    The tensor of two spheres is the flow of one (uniform within it, Stokeslet and source doublet
+    outside), averaged over the surface of the other; by a rule that knows nothing of its kinks.
+    """
+    n = 4000
+    nodes, weights = (2*np.arange(n) + 1)/n - 1, 2/n
+    for ai, aj in ((1, 1), (1, 2), (0.4, 3), (3, 0.4)):
+        for r in (0.3*abs(ai - aj) + 0.1, abs(ai - aj) + 0.2, 0.9*(ai + aj), 2*(ai + aj)):
+            x, y = r + ai*nodes, ai*np.sqrt(1 - nodes**2)
+            s = np.hypot(x, y)
+            square = (aj/np.maximum(s, aj))**2
+            perp = np.where(s < aj, 1/aj, 0.75/s*(1 + square/3))
+            par = np.where(s < aj, 1/aj, 1.5/s*(1 - square/3))
+            trace = np.sum(weights/2*(2*perp + par))
+            along = np.sum(weights/2*(perp + (par - perp)*(x/s)**2))
+            assert np.allclose(freeSpaceScalars(r, ai, aj), ((trace - along)/2, along), rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("box", [np.eye(3)*9, 7*np.array([[1, 0, 0], [0.5, 1, 0], [0.5, 0.5, 1]])])
+def testUnequalSpheresDoNotDependOnTheSplittingParameter(box):
+    """Also for a smaller sphere inside a larger one; nothing lies below zero."""
+    positions = mixedConfiguration(7, 1.0)
+    radii = np.random.default_rng(9).choice([0.3, 1.0, 2.5], 20)
+    radii[:2] = 0.3, 2.5
+    default = mobilityMatrix(positions, box, radii)
+    other = mobilityMatrix(positions, OTHER_VECTORS @ box, radii, xi=0.3)
+    assert abs(default - other).max() < ACCURACY
+    assert abs(default - default.T).max() < ACCURACY
+    assert np.linalg.eigvalsh(default)[0] > -ACCURACY
+    equal = mobilityMatrix(positions, box, np.full(20, 1.3))
+    assert abs(equal*1.3 - mobilityMatrix(positions, box, 1.3)).max() < ACCURACY
