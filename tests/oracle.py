@@ -191,27 +191,6 @@ def mobilityMatrix(positions, box, a, viscosity=None, xi=None):
     return M if np.ndim(a) else M*a
 
 
-def freeSpaceScalars(r, ai, aj):
-    """
-    The same between spheres of radii ai and aj (broadcast against r), in units of 1/(6 pi eta) and
-    1/nm: P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), whose
-    scalars of 1 and rr are added up here.
-    """
-    r, ai, aj = np.broadcast_arrays(np.asarray(r, dtype=float), ai, aj)
-    large, small = np.maximum(ai, aj), np.minimum(ai, aj)
-    far = np.maximum(r, ai + aj)
-    squares = (ai**2 + aj**2)/far**2
-    isotropic, dyadic = 3/(4*far)*(1 + squares/3), 3/(4*far)*(1 - squares)
-    near = np.where((r > large - small) & (r < ai + aj), r, ai + aj)
-    gap = (ai - aj)**2
-    partIsotropic = (16*near**3*(ai + aj) - (gap + 3*near**2)**2)/(32*near**3)/(ai*aj)
-    partDyadic = 3*(gap - near**2)**2/(32*near**3)/(ai*aj)
-    inside, apart = r <= large - small, r >= ai + aj
-    one = np.where(apart, isotropic, np.where(inside, 1/large, partIsotropic))
-    rr = np.where(apart, dyadic, np.where(inside, 0, partDyadic))
-    return one, one + rr
-
-
 def gaussianScalars(r, ai, aj):
     """
     The same between Gaussian envelopes of widths ai/sqrt(pi) and aj/sqrt(pi): the regularised
