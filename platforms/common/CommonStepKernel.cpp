@@ -107,14 +107,17 @@ void CommonStepKernel::requireRoom(const Plan& plan, const Lattice& box) const {
         throw OpenMMException(message.str());
     // On a processor the device's memory is the machine's; of other devices OpenMM does not tell.
     if (device.getIsCPU())
-        requireMemory(plan, box, scene.mobile.size(), memoryUse(plan));
+        requireMemory(plan, box, scene.mobile.size(), memoryUse(plan, box));
 }
 
-MemoryUse CommonStepKernel::memoryUse(const Plan& plan) const {
+MemoryUse CommonStepKernel::memoryUse(const Plan& plan, const Lattice& box) const {
     const int real = realSize(device);
+    const double ofSpheres = plan.mixture ? DeviceSpheres::bytesPerParticle(real) +
+                                                DeviceSphereRows::bytesPerParticle(plan, box, real)
+                                          : 0;
     return {DeviceWaveSpace::bytesPerGridPoint(plan, real), DeviceRealSpace::bytesPerPair(plan),
             DeviceWaveSpace::bytesPerParticle(plan, real) +
-                DeviceRealSpace::bytesPerParticle(real)};
+                DeviceRealSpace::bytesPerParticle(real) + ofSpheres};
 }
 
 void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
@@ -128,7 +131,7 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
         const std::string what = failure.what();
         if (what.find("Error creating array") == std::string::npos)
             throw;
-        const MemoryUse use = memoryUse(plan);
+        const MemoryUse use = memoryUse(plan, box);
         std::ostringstream message;
         message << "PSEBrownianIntegrator: the device has no room for a grid of " << plan.grid[0]
                 << " x " << plan.grid[1] << " x " << plan.grid[2] << " points ("

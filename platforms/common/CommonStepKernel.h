@@ -47,7 +47,7 @@ protected:
 private:
     std::string precisionName() const;
     void requireRoom(const numerics::Plan& plan, const numerics::Lattice& box) const;
-    MemoryUse memoryUse(const numerics::Plan& plan) const;
+    MemoryUse memoryUse(const numerics::Plan& plan, const numerics::Lattice& box) const;
     bool measures() const;
     void checkStep(OpenMM::ContextImpl& context, double dt) const;
     [[noreturn]] void refuseForce(OpenMM::ContextImpl& context) const;

@@ -53,6 +53,15 @@ inline void uploadMixed(OpenMM::ComputeArray& array, OpenMM::ComputeContext& con
         array.initialize(context, values.size(), mixedSize(context), name);
     array.upload(values, true);
 }
+/** An array of vectors of four reals. */
+inline void uploadVectors(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,
+                          const std::vector<double>& values, const char* name) {
+    array.initialize(context, values.size() / 4, 4 * realSize(context), name);
+    if (realIsDouble(context))
+        array.upload(values.data());
+    else
+        array.upload(std::vector<float>(values.begin(), values.end()).data());
+}
 
 } // namespace PSE
 

@@ -10,10 +10,11 @@ namespace PSE {
 
 DeviceEngine::DeviceEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                            const Lattice& box, double range, double unit, int summaryRows,
-                           StageClock& clock)
+                           StageClock& clock, std::shared_ptr<const SizeGroups> sizes)
     : context(programs.context()), numParticles(particles), unit(unit),
       summary(programs, static_cast<int>(mobile.size()), summaryRows),
-      places(programs, particles, mobile, box, range, summary), stages(programs.context(), clock) {
+      places(programs, particles, mobile, box, range, summary, std::move(sizes)),
+      stages(programs.context(), clock) {
     const int n = std::max(1, places.count());
     forces.initialize(context, n, 4 * realSize(context), "pseForces");
     u.initialize(context, n, 4 * realSize(context), "pseVelocities");
@@ -95,16 +96,30 @@ void DeviceFreeDraining::computeVelocities(bool forced, const Thermal* thermal) 
     stages.charge("free draining");
 }
 
+namespace {
+
+std::shared_ptr<const SizeGroups> sizesOf(const Plan& plan) {
+    return plan.mixture ? std::make_shared<const SizeGroups>(plan) : nullptr;
+}
+
+} // namespace
+
 DevicePeriodicEngine::DevicePeriodicEngine(DevicePrograms& programs, int particles,
                                            const std::vector<int>& mobile, const Plan& plan,
                                            const Lattice& box, double viscosity, StageClock& clock)
     : DeviceEngine(programs, particles, mobile, box, plan.realCutoff,
-                   1 / (6 * M_PI * viscosity * plan.a), DeviceRealSpace::summaryRows(), clock),
-      drag(6 * M_PI * viscosity * plan.a), realSpace(programs, plan, box, places, summary),
-      waveSpace(programs, plan, box, places) {}
+                   1 / (6 * M_PI * viscosity * plan.a), DeviceRealSpace::summaryRows(), clock,
+                   sizesOf(plan)),
+      drag(6 * M_PI * viscosity * plan.a),
+      spheres(plan.mixture ? new DeviceSpheres(programs, plan, particles, mobile, places)
+                           : nullptr),
+      realSpace(programs, plan, box, places, summary, spheres.get()),
+      waveSpace(programs, plan, box, places, spheres.get()) {}
 
 void DevicePeriodicEngine::setPositions() {
     places.update();
+    if (spheres)
+        spheres->update();
     waveSpace.evaluateWindows();
     stages.charge("sorting of particles and window weights");
     realSpace.findNeighbours();

@@ -23,7 +23,7 @@ public:
     /** @param unit  of velocities (nm/ps) */
     DeviceEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                  const numerics::Lattice& box, double range, double unit, int summaryRows,
-                 StageClock& clock);
+                 StageClock& clock, std::shared_ptr<const SizeGroups> sizes = nullptr);
     virtual ~DeviceEngine() = default;
 
     /** Follow the positions of the Context. */
@@ -93,7 +93,8 @@ public:
 private:
     void launch(bool forced, const Thermal* thermal, double noise);
 
-    double drag; ///< 6 pi eta a
+    double drag;                            ///< 6 pi eta a
+    std::unique_ptr<DeviceSpheres> spheres; ///< of a mixture, else NULL
     DeviceRealSpace realSpace;
     DeviceWaveSpace waveSpace;
 };

@@ -25,17 +25,36 @@ class KeyTrait : public ComputeSortImpl::SortTrait {
     const char* getSortKey() const override { return "value"; }
 };
 
+/**
+ * Columns of cells about as wide as the range; not many more cells than particles, and no first
+ * cell.
+ */
+mm_int4 cellsFor(const numerics::Lattice& box, double range, int particles) {
+    int count[3];
+    const int most = 2 * particles + 1;
+    for (int d = 0; d < 3; d++) {
+        const double cells = (d < 2 ? 1 : CELLS_PER_RANGE) * box.width(d) / range;
+        count[d] = std::max(1, static_cast<int>(std::min(cells, double(most))));
+    }
+    while (count[0] > most / count[1])
+        for (int d = 0; d < 2; d++)
+            count[d] = (count[d] + 1) / 2;
+    count[2] = std::min(count[2], std::max(1, most / (count[0] * count[1])));
+    return mm_int4(count[0], count[1], count[2], 0);
+}
+
 } // namespace
 
 DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
-                           const numerics::Lattice& box, double range, StepSummary& summary)
+                           const numerics::Lattice& box, double range, StepSummary& summary,
+                           std::shared_ptr<const SizeGroups> sizes)
     : context(programs.context()), summary(summary), numParticles(particles),
-      numMobile(static_cast<int>(mobile.size())), inCells(range > 0) {
+      numMobile(static_cast<int>(mobile.size())), inCells(range > 0), sizeGroups(std::move(sizes)) {
     const int fraction4Size = 4 * (realIsDouble(context) ? sizeof(uint64_t) : sizeof(uint32_t));
     placeArray.initialize(context, std::max(1, numMobile), fraction4Size, "psePlaces");
     slotAt.initialize<int>(context, std::max(1, numMobile), "pseSlotAt");
     slotOf.initialize<int>(context, std::max(1, particles), "pseSlotOf");
-    const ComputeProgram program = programs.particles();
+    const ComputeProgram program = programs.particles(sizeGroups != nullptr);
     if (!inCells) {
         particleAt.initialize<int>(context, std::max(1, numMobile), "pseParticleAt");
         if (numMobile > 0)
@@ -52,7 +71,7 @@ DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::v
     rankOf.upload(ranks);
     located.initialize(context, particles, fraction4Size, "pseLocated");
     keys.initialize<uint64_t>(context, numMobile + 1, "pseKeys");
-    cellStart.initialize<int>(context, cellCount.x * cellCount.y * cellCount.z + 1, "pseCellStart");
+    cellStart.initialize<int>(context, numCells + 1, "pseCellStart");
     const numerics::Matrix3 inverse = box.vectors().inverse();
     uploadMixed(
         inverseBox, context,
@@ -67,19 +86,22 @@ DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::v
     findCells = DeviceKernel(context, program, "findCells");
 }
 
-/** Columns of cells about as wide as the range; not many more cells than particles. */
 void DevicePlaces::chooseCells(const numerics::Lattice& box, double range) {
-    int count[3];
-    const int most = 2 * numMobile + 1;
-    for (int d = 0; d < 3; d++) {
-        const double cells = (d < 2 ? 1 : CELLS_PER_RANGE) * box.width(d) / range;
-        count[d] = std::max(1, static_cast<int>(std::min(cells, double(most))));
+    if (!sizeGroups) {
+        cellCount = cellsFor(box, range, numMobile);
+        numCells = cellCount.x * cellCount.y * cellCount.z;
+        return;
     }
-    while (count[0] > most / count[1])
-        for (int d = 0; d < 2; d++)
-            count[d] = (count[d] + 1) / 2;
-    count[2] = std::min(count[2], std::max(1, most / (count[0] * count[1])));
-    cellCount = mm_int4(count[0], count[1], count[2], 0);
+    std::vector<mm_int4> cells;
+    for (const SizeGroups::Group& group : sizeGroups->groups) {
+        cells.push_back(cellsFor(box, group.range, group.count));
+        cells.back().w = numCells;
+        numCells += cells.back().x * cells.back().y * cells.back().z;
+    }
+    cellsOfGroups.initialize<mm_int4>(context, cells.size(), "pseGroupCells");
+    cellsOfGroups.upload(cells);
+    groupOf.initialize<int>(context, numMobile, "pseGroupOf");
+    groupOf.upload(sizeGroups->groupOf);
 }
 
 void DevicePlaces::update() {
@@ -90,17 +112,22 @@ void DevicePlaces::update() {
 }
 
 void DevicePlaces::sortByCells() {
-    if (context.getUseMixedPrecision())
-        locateParticles(numParticles, numParticles, cellCount, context.getPosq(),
-                        context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf,
-                        context.getPosqCorrection());
+    const auto locate = [this](auto&&... cells) {
+        if (context.getUseMixedPrecision())
+            locateParticles(numParticles, numParticles, cells..., context.getPosq(),
+                            context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf,
+                            context.getPosqCorrection());
+        else
+            locateParticles(numParticles, numParticles, cells..., context.getPosq(),
+                            context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf);
+    };
+    if (sizeGroups)
+        locate(groupOf, cellsOfGroups);
     else
-        locateParticles(numParticles, numParticles, cellCount, context.getPosq(),
-                        context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf);
+        locate(cellCount);
     sort->sort(keys);
     placeParticles(numMobile, numMobile, keys, slotOf, located, placeArray, slotAt,
                    summary.maxima());
-    const int numCells = cellCount.x * cellCount.y * cellCount.z;
     findCells(numCells + 1, numMobile, numCells, keys, cellStart);
 }
 

@@ -24,17 +24,29 @@ OpenMM::ComputeProgram DevicePrograms::program(const std::string& name, const st
     return made;
 }
 
-OpenMM::ComputeProgram DevicePrograms::particles() {
-    return program("particles", KernelSources::particles, {}, {});
+OpenMM::ComputeProgram DevicePrograms::particles(bool groups) {
+    return program("particles", KernelSources::particles,
+                   groups ? Defines{{"SIZE_GROUPS", "1"}} : Defines{}, {});
 }
 
 OpenMM::ComputeProgram DevicePrograms::realSpace(const Defines& defines,
                                                  const PlanConstants& constants) {
-    return program("realSpace", KernelSources::realSpace, defines, constants);
+    if (defines.count("MIXTURE") > 0)
+        return program("sphereRows",
+                       KernelSources::displacement + KernelSources::sphereRows +
+                           KernelSources::realSpace,
+                       defines, constants);
+    return program("realSpace", KernelSources::displacement + KernelSources::realSpace, defines,
+                   constants);
 }
 
 OpenMM::ComputeProgram DevicePrograms::waveSpace(const PlanConstants& constants) {
-    return program("waveSpace", KernelSources::waveSpace, {}, constants);
+    return program("waveSpace", KernelSources::waves + KernelSources::waveSpace, {}, constants);
+}
+
+OpenMM::ComputeProgram DevicePrograms::sphereSpread(const PlanConstants& constants) {
+    return program("sphereSpread", KernelSources::waves + KernelSources::sphereSpread, {},
+                   constants);
 }
 
 OpenMM::FFT3D DevicePrograms::transform(const std::array<int, 3>& grid) {

@@ -22,12 +22,16 @@ public:
     explicit DevicePrograms(OpenMM::ComputeContext& context) : device(context) {}
     OpenMM::ComputeContext& context() const { return device; }
 
-    /** kernels/particles.cc, with what it builds upon. */
-    OpenMM::ComputeProgram particles();
-    /** kernels/realSpace.cc */
+    /**
+     * kernels/particles.cc, with what it builds upon.
+     * @param groups  sorted also by size
+     */
+    OpenMM::ComputeProgram particles(bool groups = false);
+    /** kernels/realSpace.cc; `defines` may have MIXTURE, for unequal spheres */
     OpenMM::ComputeProgram realSpace(const Defines& defines, const PlanConstants& constants);
-    /** kernels/waveSpace.cc */
+    /** kernels/waves.cc with kernels/waveSpace.cc, or for unequal spheres with sphereSpread.cc */
     OpenMM::ComputeProgram waveSpace(const PlanConstants& constants);
+    OpenMM::ComputeProgram sphereSpread(const PlanConstants& constants);
     /** From reals to half of their modes, and back. */
     OpenMM::FFT3D transform(const std::array<int, 3>& grid);
     /** To be called before programs, arrays and contexts end. */

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "DeviceRealSpace.h"
+#include "DeviceGeometry.h"
 #include "numerics/Lanczos.h"
 #include "numerics/RealTable.h"
 #include "numerics/Rpy.h"
@@ -13,9 +14,6 @@ namespace PSE {
 
 namespace {
 
-/// room for neighbours beyond their mean number: structure and fluctuations, then what is found
-constexpr double ROOM = 1.5, MORE_ROOM = 1.2;
-constexpr int LEAST_ROOM = 16;
 constexpr int FIRST_ITERATIONS = 5; ///< of a first step
 /// in radii squared; below, 1/r^2 is not needed and might overflow
 constexpr double SMALLEST_R2 = 1e-30;
@@ -40,6 +38,8 @@ int DeviceRealSpace::summaryRows() {
 }
 
 double DeviceRealSpace::bytesPerPair(const Plan& plan) {
+    if (plan.mixture)
+        return 0; // pairs have ranges of their own: DeviceSphereRows counts them
     return ROOM * (plan.sumImages ? sizeof(mm_int2) : sizeof(int));
 }
 
@@ -48,15 +48,44 @@ double DeviceRealSpace::bytesPerParticle(int realSize) {
 }
 
 DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
-                                 DevicePlaces& places, StepSummary& summary)
+                                 DevicePlaces& places, StepSummary& summary, DeviceSpheres* spheres)
     : context(programs.context()), places(places), summary(summary),
       lanczosTolerance(plan.lanczosTolerance),
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
       negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
       reorthogonalise(realIsDouble(this->context)), sumImages(plan.sumImages) {
+    Defines defines = {{"MOST_VECTORS", std::to_string(LanczosTridiagonal::MAX_ITERATIONS)},
+                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)}};
+    if (sumImages)
+        defines["SUM_IMAGES"] = "1";
+    else if (isTilted(box))
+        defines["TILTED"] = "1";
+    if (spheres != nullptr)
+        sphereRows.reset(
+            new DeviceSphereRows(programs, plan, box, places, *spheres, summary, defines));
+    const ComputeProgram program =
+        sphereRows ? sphereRows->program() : prepareRows(programs, plan, box, defines);
+    multiplyReal = DeviceKernel(context, program, "multiplyReal");
+    drawNoise = DeviceKernel(context, program, "drawNoise");
+    expandBasis = DeviceKernel(context, program, "expandBasis");
+    makeOrthogonal = DeviceKernel(context, program, "makeOrthogonal");
+    findOverlaps = DeviceKernel(context, program, "findOverlaps");
+    removeOverlaps = DeviceKernel(context, program, "removeOverlaps");
+    combineBasis = DeviceKernel(context, program, "combineBasis");
+    if (reorthogonalise)
+        overlaps.initialize(context,
+                            LanczosTridiagonal::MAX_ITERATIONS * groupsFor(context, places.count()),
+                            mixedSize(context), "pseOverlaps");
+    coefficients.initialize(context, LanczosTridiagonal::MAX_ITERATIONS, realSize(context),
+                            "pseCoefficients");
+}
+
+/** Of equal spheres. @return the program that all kernels are from */
+ComputeProgram DeviceRealSpace::prepareRows(DevicePrograms& programs, const Plan& plan,
+                                            const Lattice& box, Defines defines) {
     const int n = places.count();
     const double mean = meanNeighbours(box, n, plan.realCutoff);
-    capacity = static_cast<int>(std::min(ROOM * mean + LEAST_ROOM, 1e9));
+    capacity = static_cast<int>(std::min(ROOM * mean + LEAST_ROOM, MOST_ROOM));
     const RealTable table = makeRealTable(*plan.split, plan.realCutoff / plan.a, plan.tableError);
     std::vector<double> values;
     appendCoefficients(table.F, values);
@@ -69,66 +98,37 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
     const PlanConstants constants = {{"DEGREE_F", table.F.degree()},
                                      {"DEGREE_C", table.C.degree()}};
     uploadConstants(planConstants, context, constants);
-    Defines defines = {{"MOST_VECTORS", std::to_string(LanczosTridiagonal::MAX_ITERATIONS)},
-                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)},
-                       {"CONTACT", context.doubleToString(c::CONTACT)},
-                       {"APART_F1", context.doubleToString(c::APART_F1)},
-                       {"APART_F3", context.doubleToString(c::APART_F3)},
-                       {"APART_G1", context.doubleToString(c::APART_G1)},
-                       {"APART_G3", context.doubleToString(c::APART_G3)},
-                       {"OVERLAP_F1", context.doubleToString(c::OVERLAP_F1)},
-                       {"OVERLAP_G1", context.doubleToString(c::OVERLAP_G1)}};
-    const Matrix3& v = box.vectors();
-    if (sumImages)
-        defines["SUM_IMAGES"] = "1";
-    else if (v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0)
-        defines["TILTED"] = "1";
+    defines.insert({{"CONTACT", context.doubleToString(c::CONTACT)},
+                    {"APART_F1", context.doubleToString(c::APART_F1)},
+                    {"APART_F3", context.doubleToString(c::APART_F3)},
+                    {"APART_G1", context.doubleToString(c::APART_G1)},
+                    {"APART_G3", context.doubleToString(c::APART_G3)},
+                    {"OVERLAP_F1", context.doubleToString(c::OVERLAP_F1)},
+                    {"OVERLAP_G1", context.doubleToString(c::OVERLAP_G1)}});
     const ComputeProgram program = programs.realSpace(defines, constants);
     findKernel = DeviceKernel(context, program, "findNeighbours");
-    multiplyReal = DeviceKernel(context, program, "multiplyReal");
-    drawNoise = DeviceKernel(context, program, "drawNoise");
-    expandBasis = DeviceKernel(context, program, "expandBasis");
-    makeOrthogonal = DeviceKernel(context, program, "makeOrthogonal");
-    findOverlaps = DeviceKernel(context, program, "findOverlaps");
-    removeOverlaps = DeviceKernel(context, program, "removeOverlaps");
-    combineBasis = DeviceKernel(context, program, "combineBasis");
-    if (reorthogonalise)
-        overlaps.initialize(context, LanczosTridiagonal::MAX_ITERATIONS * groupsFor(context, n),
-                            mixedSize(context), "pseOverlaps");
-    coefficients.initialize(context, LanczosTridiagonal::MAX_ITERATIONS, realSize(context),
-                            "pseCoefficients");
+    return program;
 }
 
 /** What realSpace.cc calls geometry, in that order; the images of the box, if they are summed. */
 void DeviceRealSpace::prepareGeometry(const Plan& plan, const Lattice& box) {
-    const Matrix3 v = box.vectors() / plan.a;
-    const double unit = realIsDouble(context) ? std::ldexp(1.0, -64) : std::ldexp(1.0, -32);
     const double rc = plan.realCutoff / plan.a;
-    std::vector<double> values = {unit * v(0, 0), unit * v(0, 1), unit * v(1, 1), unit * v(0, 2),
-                                  unit * v(1, 2), unit * v(2, 2), v(0, 0),        v(0, 1),
-                                  v(1, 1),        rc * rc,        2 / (rc * rc)};
-    values.push_back(makeRealTable(*plan.split, rc, plan.tableError).self);
+    std::vector<double> values = geometryOf(context, box, plan.a);
+    values.insert(values.end(),
+                  {rc * rc, 2 / (rc * rc), makeRealTable(*plan.split, rc, plan.tableError).self});
     for (int d = 0; d < 3; d++)
         values.push_back(
             std::min((1 + REACH_MARGIN) * plan.realCutoff / box.width(d) + REACH_MARGIN, 0.9));
     uploadReals(geometry, context, values, "pseGeometry");
-    if (!sumImages)
-        return;
-    std::vector<double> vectors;
-    for (const numerics::Vec3& image : box.imagesWithin(plan.realCutoff)) {
-        const double other = image == numerics::Vec3::Zero() ? 0 : 1;
-        vectors.insert(vectors.end(),
-                       {image[0] / plan.a, image[1] / plan.a, image[2] / plan.a, other});
-        numImages++;
-    }
-    images.initialize(context, numImages, 4 * realSize(context), "pseImages");
-    if (realIsDouble(context))
-        images.upload(vectors.data());
-    else
-        images.upload(std::vector<float>(vectors.begin(), vectors.end()).data());
+    if (sumImages)
+        numImages = uploadImages(images, context, box, plan.realCutoff, plan.a);
 }
 
 void DeviceRealSpace::findNeighbours() {
+    if (sphereRows) {
+        sphereRows->find();
+        return;
+    }
     const int n = places.count();
     const int entry = sumImages ? sizeof(mm_int2) : sizeof(int);
     neighbours.reserve(context, size_t(capacity) * n, entry, "pseNeighbours");
@@ -141,6 +141,8 @@ void DeviceRealSpace::findNeighbours() {
 }
 
 bool DeviceRealSpace::hadRoom() {
+    if (sphereRows)
+        return sphereRows->hadRoom();
     const double most = summary.maximum(StepSummary::Neighbours);
     if (most <= capacity)
         return true;
@@ -152,7 +154,9 @@ bool DeviceRealSpace::hadRoom() {
 template <class... Arguments>
 void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments) {
     const int n = places.count();
-    if (sumImages)
+    if (sphereRows)
+        sphereRows->withMatrix(kernel, arguments...);
+    else if (sumImages)
         kernel(n, n, planConstants, places.places(), images, *neighbours, counts, geometry, tables,
                arguments...);
     else

@@ -4,6 +4,7 @@
 
 #include "DevicePlaces.h"
 #include "DevicePrograms.h"
+#include "DeviceSphereRows.h"
 #include "StepSummary.h"
 #include "numerics/Noise.h"
 #include "numerics/Plan.h"
@@ -16,8 +17,10 @@ namespace PSE {
  */
 class DeviceRealSpace {
 public:
+    /** @param spheres  of a mixture, else NULL */
     DeviceRealSpace(DevicePrograms& programs, const numerics::Plan& plan,
-                    const numerics::Lattice& box, DevicePlaces& places, StepSummary& summary);
+                    const numerics::Lattice& box, DevicePlaces& places, StepSummary& summary,
+                    DeviceSpheres* spheres = nullptr);
     /** Rows of the StepSummary's sums that the Lanczos process may use. */
     static int summaryRows();
 
@@ -44,6 +47,8 @@ public:
     int lanczosIterations() const { return iterations; }
 
 private:
+    OpenMM::ComputeProgram prepareRows(DevicePrograms& programs, const numerics::Plan& plan,
+                                       const numerics::Lattice& box, Defines defines);
     void prepareGeometry(const numerics::Plan& plan, const numerics::Lattice& box);
     void iterate(int from, int to);
     template <class... Arguments> void withMatrix(DeviceKernel& kernel, Arguments&&... arguments);
@@ -53,7 +58,8 @@ private:
     StepSummary& summary;
     double lanczosTolerance, negativeTolerance;
     bool reorthogonalise, sumImages;
-    int numImages = 0, capacity;
+    int numImages = 0, capacity = 0;
+    std::unique_ptr<DeviceSphereRows> sphereRows; ///< in place of the rows of equal spheres
     OpenMM::ComputeArray planConstants, geometry, tables, images, counts, coefficients, overlaps;
     GrowingArray neighbours, basis;
     DeviceKernel findKernel, multiplyReal, drawNoise, expandBasis, makeOrthogonal, findOverlaps,

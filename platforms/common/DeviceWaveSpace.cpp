@@ -4,8 +4,6 @@
 #include "DeviceRealSpace.h"
 #include "numerics/WaveFactors.h"
 #include "numerics/Window.h"
-#include "openmm/internal/ThreadPool.h"
-#include <atomic>
 
 using namespace OpenMM;
 using namespace PSE::numerics;
@@ -27,10 +25,26 @@ size_t numModes(const mm_int4& size) {
 } // namespace
 
 DeviceWaveSpace::DeviceWaveSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
-                                 DevicePlaces& places)
+                                 DevicePlaces& places, DeviceSpheres* spheres)
     : context(programs.context()), places(places),
       size(plan.grid[0], plan.grid[1], plan.grid[2], 0), support(plan.windowSupport),
       lanes(lanesFor(plan.windowSupport)) {
+    if (spheres != nullptr)
+        sphereSpread.reset(new DeviceSphereSpread(programs, plan, box, places, *spheres));
+    // The transform uses its input as workspace: both need room for complex numbers.
+    for (int c = 0; c < 3; c++) {
+        grids[c].initialize(context, 2 * numModes(size), realSize(context), "pseGrid");
+        modes[c].initialize(context, numModes(size), 2 * realSize(context), "pseModes");
+    }
+    fft = programs.transform(plan.grid);
+    prepareFactors(plan, box);
+    const ComputeProgram program =
+        sphereSpread ? sphereSpread->program() : prepareWindow(programs, plan);
+    scaleWaves = DeviceKernel(context, program, "scaleWaves");
+}
+
+/** @return the program that its kernels are from */
+ComputeProgram DeviceWaveSpace::prepareWindow(DevicePrograms& programs, const Plan& plan) {
     const int n = places.count();
     const std::vector<Polynomial> pieces =
         Window(support, plan.windowShape).polynomials(plan.windowError);
@@ -42,21 +56,14 @@ DeviceWaveSpace::DeviceWaveSpace(DevicePrograms& programs, const Plan& plan, con
     uploadReals(coefficients, context, table, "pseWindow");
     starts.initialize<mm_int4>(context, n, "pseStarts");
     weights.initialize(context, size_t(3) * support * n, realSize(context), "pseWeights");
-    // The transform uses its input as workspace: both need room for complex numbers.
-    for (int c = 0; c < 3; c++) {
-        grids[c].initialize(context, 2 * numModes(size), realSize(context), "pseGrid");
-        modes[c].initialize(context, numModes(size), 2 * realSize(context), "pseModes");
-    }
-    fft = programs.transform(plan.grid);
-    prepareFactors(plan, box);
     const PlanConstants constants = {
         {"SUPPORT", support}, {"WINDOW_DEGREE", degree}, {"LANES", lanes}};
     uploadConstants(planConstants, context, constants);
     const ComputeProgram program = programs.waveSpace(constants);
     windowKernel = DeviceKernel(context, program, "evaluateWindows");
     spreadForces = DeviceKernel(context, program, "spreadForces");
-    scaleWaves = DeviceKernel(context, program, "scaleWaves");
     gatherVelocities = DeviceKernel(context, program, "gatherVelocities");
+    return program;
 }
 
 double DeviceWaveSpace::bytesPerGridPoint(const Plan& plan, int realSize) {
@@ -66,6 +73,8 @@ double DeviceWaveSpace::bytesPerGridPoint(const Plan& plan, int realSize) {
 }
 
 double DeviceWaveSpace::bytesPerParticle(const Plan& plan, int realSize) {
+    if (plan.mixture)
+        return DeviceSphereSpread::bytesPerParticle(plan, realSize);
     return 3.0 * plan.windowSupport * realSize + sizeof(mm_int4);
 }
 
@@ -73,14 +82,11 @@ void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
     const WaveFactors exact(plan, box);
     std::vector<double> values(numModes(size));
     const int sizeZ = size.z / 2 + 1;
-    std::atomic<int> next(0);
-    context.getThreadPool().execute([&](ThreadPool&, int) {
-        for (int x = next++; x < size.x; x = next++)
-            for (int y = 0; y < size.y; y++)
-                for (int z = 0; z < sizeZ; z++)
-                    values[(size_t(x) * size.y + y) * sizeZ + z] = exact(x, y, z);
+    forEach(context, size.x, [&](int x) {
+        for (int y = 0; y < size.y; y++)
+            for (int z = 0; z < sizeZ; z++)
+                values[(size_t(x) * size.y + y) * sizeZ + z] = exact(x, y, z);
     });
-    context.getThreadPool().waitForThreads();
     uploadReals(factors, context, values, "pseFactors");
     std::vector<double> vectors;
     for (int i = 0; i < 9; i++)
@@ -89,17 +95,34 @@ void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
 }
 
 void DeviceWaveSpace::evaluateWindows() {
+    if (sphereSpread)
+        return; // weights are evaluated where they are used
     const int n = places.count();
     windowKernel(3 * support * n, n, size, planConstants, places.places(), coefficients, starts,
                  weights);
+}
+
+void DeviceWaveSpace::spread(ComputeArray& f) {
+    if (sphereSpread)
+        sphereSpread->spread(f, grids);
+    else
+        spreadForces(context.getNumThreadBlocks() * GROUP_SIZE, size, places.cells(), planConstants,
+                     places.cellStarts(), starts, weights, f, grids[0], grids[1], grids[2]);
+}
+
+void DeviceWaveSpace::gather(ComputeArray& u) {
+    if (sphereSpread)
+        sphereSpread->gather(grids, u);
+    else
+        gatherVelocities(lanes * places.count(), places.count(), size, planConstants, starts,
+                         weights, grids[0], grids[1], grids[2], u);
 }
 
 void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKey& key,
                                     ComputeArray& u, DeviceClock& clock) {
     const int all = context.getNumThreadBlocks() * GROUP_SIZE;
     if (f != NULL) {
-        spreadForces(all, size, places.cells(), planConstants, places.cellStarts(), starts, weights,
-                     *f, grids[0], grids[1], grids[2]);
+        spread(*f);
         clock.charge("spreading");
         for (int c = 0; c < 3; c++)
             fft->execFFT(grids[c], modes[c], true);
@@ -111,8 +134,7 @@ void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKe
     for (int c = 0; c < 3; c++)
         fft->execFFT(modes[c], grids[c], false);
     clock.charge("Fourier transforms");
-    gatherVelocities(lanes * places.count(), places.count(), size, planConstants, starts, weights,
-                     grids[0], grids[1], grids[2], u);
+    gather(u);
     clock.charge("gathering");
 }
 

@@ -4,20 +4,23 @@
 
 #include "DeviceClock.h"
 #include "DevicePlaces.h"
+#include "DeviceSphereSpread.h"
 #include "numerics/Noise.h"
 #include "numerics/Plan.h"
 
 namespace PSE {
 
 /**
- * The wave-space half on a device [T4, T9, T10]: spread by the Kaiser-Bessel window, transform,
- * scale (forced and thermal part together), transform back, gather. Mobilities in units of
- * 1/(6 pi eta a), vectors by place.
+ * The wave-space half on a device [T4, T9, T10]: spread by the Kaiser-Bessel window, or as unequal
+ * spheres, transform, scale (forced and thermal part together), transform back, gather. Mobilities
+ * in units of 1/(6 pi eta a), vectors by place.
  */
 class DeviceWaveSpace {
 public:
+    /** @param spheres  of a mixture, else NULL */
     DeviceWaveSpace(DevicePrograms& programs, const numerics::Plan& plan,
-                    const numerics::Lattice& box, DevicePlaces& places);
+                    const numerics::Lattice& box, DevicePlaces& places,
+                    DeviceSpheres* spheres = nullptr);
     /** Bytes of reals of one size for each grid point, and for each particle. */
     static double bytesPerGridPoint(const numerics::Plan& plan, int realSize);
     static double bytesPerParticle(const numerics::Plan& plan, int realSize);
@@ -33,12 +36,16 @@ public:
                        OpenMM::ComputeArray& u, DeviceClock& clock);
 
 private:
+    OpenMM::ComputeProgram prepareWindow(DevicePrograms& programs, const numerics::Plan& plan);
+    void spread(OpenMM::ComputeArray& f);
+    void gather(OpenMM::ComputeArray& u);
     void prepareFactors(const numerics::Plan& plan, const numerics::Lattice& box);
 
     OpenMM::ComputeContext& context;
     DevicePlaces& places;
     OpenMM::mm_int4 size;
     int support, lanes;
+    std::unique_ptr<DeviceSphereSpread> sphereSpread; ///< in place of the window
     OpenMM::ComputeArray planConstants, coefficients, starts, weights, factors, waves;
     OpenMM::ComputeArray grids[3], modes[3];
     OpenMM::FFT3D fft;

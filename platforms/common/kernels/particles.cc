@@ -3,11 +3,26 @@
 // by cells of the box and, within a cell, by their index in the System. Places depend on positions
 // alone, not on the order of slots, and with them every sum below.
 
+// With SIZE_GROUPS the particles of each group, of like radii, have cells of their own: groupCells are
+// those of each group, and the first of them.
+#ifdef SIZE_GROUPS
+#define FIRST_CELL cells.w+
+#else
+#define FIRST_CELL
+#endif
+
 /**
  * Where all particles are, and sorting keys of those that move.
- * @param rankOf  number of a particle among those that move, negative for one that does not
+ * @param rankOf   number of a particle among those that move, negative for one that does not
+ * @param groupOf  by that number
  */
-KERNEL void locateParticles(int numAtoms, int4 cells, GLOBAL const real4* RESTRICT posq,
+KERNEL void locateParticles(int numAtoms,
+#ifdef SIZE_GROUPS
+        GLOBAL const int* RESTRICT groupOf, GLOBAL const int4* RESTRICT groupCells,
+#else
+        int4 cells,
+#endif
+        GLOBAL const real4* RESTRICT posq,
         GLOBAL const int* RESTRICT atomIndex, GLOBAL const int* RESTRICT rankOf,
         GLOBAL const mixed* RESTRICT inverseBox, GLOBAL fraction4* RESTRICT located,
         GLOBAL mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT slotOf
@@ -34,8 +49,11 @@ KERNEL void locateParticles(int numAtoms, int4 cells, GLOBAL const real4* RESTRI
         slotOf[particle] = slot;
         const int rank = rankOf[particle];
         if (rank >= 0) {
+#ifdef SIZE_GROUPS
+            const int4 cells = groupCells[groupOf[rank]];
+#endif
             const int column = cellOf(s.x, cells.x)*cells.y+cellOf(s.y, cells.y);
-            keys[rank+1] = ((mm_ulong) (column*cells.z+cellOf(s.z, cells.z)) << 32) | (unsigned int) particle;
+            keys[rank+1] = ((mm_ulong) (FIRST_CELL column*cells.z+cellOf(s.z, cells.z)) << 32) | (unsigned int) particle;
         }
     }
     if (GLOBAL_ID == 0)
@@ -63,6 +81,21 @@ KERNEL void placeParticles(int n, GLOBAL const mm_ulong* RESTRICT keys, GLOBAL c
     if (LOCAL_ID == 0)
         largest[UNSORTED*NUM_GROUPS+GROUP_ID] = unsorted;
 }
+
+#ifdef SIZE_GROUPS
+/**
+ * What kind of sphere is at each place, and its radius.
+ * @param kindOf  by particle of the System
+ */
+KERNEL void placeSpheres(int n, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT kindOf,
+        GLOBAL const real* RESTRICT radii, GLOBAL int* RESTRICT kinds, GLOBAL real* RESTRICT radiusAt) {
+    for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
+        const int kind = kindOf[places[place].w];
+        kinds[place] = kind;
+        radiusAt[place] = radii[kind];
+    }
+}
+#endif
 
 /** First place of every cell, and n after the last. */
 KERNEL void findCells(int n, int numCells, GLOBAL const mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT cellStart) {

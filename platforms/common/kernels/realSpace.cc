@@ -4,34 +4,12 @@
 // A thread owns a row and adds its neighbours in their order: no sum is shared between threads.
 // DEGREE_F and DEGREE_C are numbers, or entries of `plan` (PlanConstants).
 
-// places in the array of geometry, lengths in radii
-#define BOX 0    // x of a, b; y of b; x, y, z of c, per unit of fractions
-#define WHOLE 6  // x of a, b; y of b
+#ifndef MIXTURE // else sphereRows.cc
+// further places in the array of geometry
 #define RANGE2 9
 #define SCALE 10 // of t = scale r^2 - 1
 #define SELF 11
 #define REACH 12 // range as a fraction of the box widths, three numbers
-
-/** From b to a: the nearest image, or with SUM_IMAGES the one of wrapped fractions. */
-DEVICE real4 displacement(fraction4 a, fraction4 b, GLOBAL const real* RESTRICT geometry) {
-    const real sx = (real) (signedFraction) (a.x-b.x), sy = (real) (signedFraction) (a.y-b.y),
-            sz = (real) (signedFraction) (a.z-b.z);
-    GLOBAL const real* RESTRICT box = geometry+BOX;
-    real4 d = make_real4(box[0]*sx+box[1]*sy+box[3]*sz, box[2]*sy+box[4]*sz, box[5]*sz, 0);
-#if defined(TILTED) && !defined(SUM_IMAGES)
-    // the nearest fractions are not always the nearest image there
-    GLOBAL const real* RESTRICT whole = geometry+WHOLE;
-    const real nb = floor(d.y/whole[2]+(real) 0.5);
-    d.y -= nb*whole[2];
-    d.x -= nb*whole[1];
-    d.x -= floor(d.x/whole[0]+(real) 0.5)*whole[0];
-#endif
-    return d;
-}
-
-DEVICE real lengthSquared(real4 d) {
-    return d.x*d.x+d.y*d.y+d.z*d.z;
-}
 
 /**
  * Rows of neighbours, [k][i]: from the cells around each particle, or with SUM_IMAGES every image of
@@ -167,6 +145,8 @@ DEVICE real4 rowProduct(int i, int n, GLOBAL const int* RESTRICT plan, GLOBAL co
 #define MATRIX_PARAMETERS int n, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places, GLOBAL const int* RESTRICT neighbours, \
         GLOBAL const int* RESTRICT counts, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables
 #define ROW_PRODUCT(i, v) rowProduct(i, n, plan, places, neighbours, counts, geometry, tables, v)
+#endif
+
 #endif
 
 /** u = M_R f */
