@@ -37,6 +37,7 @@ protected:
     void adapt(numerics::UnboundedRequest& request) const override;
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void useFreeDraining() override;
+    bool servesMixtures() const override { return true; }
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan&) const override { return precisionName(); }
     std::string precisionName(const numerics::UnboundedPlan&) const override {

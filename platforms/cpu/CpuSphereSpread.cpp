@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "CpuSphereSpread.h"
+#include "numerics/GridMetric.h"
 #include "numerics/RadialWindow.h"
 #include <algorithm>
 #include <cmath>
@@ -14,11 +15,6 @@ RadialWindow windowOf(const Plan& plan) {
     return RadialWindow(plan.windowSupport, plan.windowShape, plan.windowSpacing);
 }
 
-/** How many grid points a sphere of radius 1 (in radii of the Plan) reaches to along axis d. */
-double pointsPerLengthOf(const Plan& plan, const Lattice& box, int d) {
-    return plan.grid[d] * plan.a / box.width(d);
-}
-
 /** Grid points within `reach` on either side of any centre, at most. */
 int extentOf(double reach) {
     return static_cast<int>(2 * reach) + 1;
@@ -28,7 +24,7 @@ int extentOf(double reach) {
 
 template <class Real> int CpuSphereSpread<Real>::paddingOf(const Plan& plan, const Lattice& box) {
     const double reach = windowOf(plan).reach(plan.mixture->radii().back());
-    return extentOf(reach * pointsPerLengthOf(plan, box, 2)) + SPHERE_LANES;
+    return extentOf(reach * GridMetric(box, plan.grid, plan.a).pointsPerLength[2]) + SPHERE_LANES;
 }
 
 template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan& plan) {
@@ -42,22 +38,15 @@ template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan&
 template <class Real>
 CpuSphereSpread<Real>::CpuSphereSpread(const Plan& plan, const Lattice& box, const Threads& threads)
     : Base(plan.grid, paddingOf(plan, box)) {
+    const GridMetric metric(box, plan.grid, plan.a);
     for (int d = 0; d < 3; d++)
-        pointsPerLength[d] = pointsPerLengthOf(plan, box, d);
-    // |A s|^2 with A upper triangular, A_d = a_d/M_d: squares completed from z to x.
-    Matrix3 A = box.vectors() / plan.a;
-    for (int d = 0; d < 3; d++)
-        A.col(d) /= plan.grid[d];
-    const Matrix3 G = A.transpose() * A;
-    const double x = G(0, 0) - G(0, 2) * G(0, 2) / G(2, 2),
-                 y = G(1, 1) - G(1, 2) * G(1, 2) / G(2, 2),
-                 xy = G(0, 1) - G(0, 2) * G(1, 2) / G(2, 2);
-    plane = Real(x - xy * xy / y);
-    line = Real(y);
-    point = Real(G(2, 2));
-    skewY = Real(-xy / y);
-    skewX = Real(-G(0, 2) / G(2, 2));
-    skewZ = Real(-G(1, 2) / G(2, 2));
+        pointsPerLength[d] = metric.pointsPerLength[d];
+    plane = Real(metric.plane);
+    line = Real(metric.line);
+    point = Real(metric.point);
+    skewY = Real(metric.skewY);
+    skewX = Real(metric.skewX);
+    skewZ = Real(metric.skewZ);
 
     const std::vector<double>& radii = plan.mixture->radii();
     for (double radius : plan.mixture->particleRadii())

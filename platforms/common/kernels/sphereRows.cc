@@ -16,10 +16,10 @@ typedef struct {
 } Row;
 
 /** @param groupRows  of each group its first place, its particles and the length of its rows */
-DEVICE Row rowOf(int place, int groups, GLOBAL const int4* RESTRICT groupRows) {
+DEVICE Row rowOf(int place, int sizeGroups, GLOBAL const int4* RESTRICT groupRows) {
     mm_long before = 0;
     int g = 0;
-    for (; g < groups-1 && place >= groupRows[g+1].x; g++)
+    for (; g < sizeGroups-1 && place >= groupRows[g+1].x; g++)
         before += groupRows[g].y*(mm_long) groupRows[g].z;
     Row row;
     row.first = before+place-groupRows[g].x;
@@ -57,7 +57,7 @@ DEVICE int interact(real r2, real range) {
  * @param counts      neighbours kept, at most the length of the row
  * @param largest     per group of threads, the most neighbours for one entry of a row
  */
-KERNEL void findSpheres(int n, int groups,
+KERNEL void findSpheres(int n, int sizeGroups,
 #ifdef SUM_IMAGES
         int numImages, GLOBAL const real4* RESTRICT images,
 #else
@@ -71,7 +71,7 @@ KERNEL void findSpheres(int n, int groups,
     real most = 0;
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         const fraction4 own = places[i];
-        const Row row = rowOf(i, groups, groupRows);
+        const Row row = rowOf(i, sizeGroups, groupRows);
         const real ownRange = geometry[ENVELOPE]+radii[i];
         int found = 0;
 #ifdef SUM_IMAGES
@@ -89,7 +89,7 @@ KERNEL void findSpheres(int n, int groups,
         }
 #else
         const real x = fromFraction(own.x), y = fromFraction(own.y), z = fromFraction(own.z);
-        for (int g = 0; g < groups; g++) {
+        for (int g = 0; g < sizeGroups; g++) {
             const int4 cells = groupCells[g];
             const real range = ownRange+groupRadii[g];
             const real reachX = shareOfBox(range, geometry[PER_LENGTH]), reachY = shareOfBox(range, geometry[PER_LENGTH+1]),
@@ -185,7 +185,7 @@ DEVICE real2 waveScalars(real t, int kindA, int kindB, GLOBAL const int* RESTRIC
 }
 
 /** F and C of every pair in the rows. */
-KERNEL void evaluatePairs(int n, int groups, GLOBAL const int* RESTRICT plan, GLOBAL const int4* RESTRICT groupRows,
+KERNEL void evaluatePairs(int n, int sizeGroups, GLOBAL const int* RESTRICT plan, GLOBAL const int4* RESTRICT groupRows,
         GLOBAL const fraction4* RESTRICT places, IMAGES GLOBAL const real* RESTRICT radii, GLOBAL const int* RESTRICT kinds,
         GLOBAL const Neighbour* RESTRICT neighbours, GLOBAL const int* RESTRICT counts,
         GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables,
@@ -195,7 +195,7 @@ KERNEL void evaluatePairs(int n, int groups, GLOBAL const int* RESTRICT plan, GL
         GLOBAL real2* RESTRICT pairs) {
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         const fraction4 own = places[i];
-        const Row row = rowOf(i, groups, groupRows);
+        const Row row = rowOf(i, sizeGroups, groupRows);
         const int count = counts[i];
         for (int k = 0; k < count; k++) {
             const mm_long at = row.first+k*(mm_long) row.stride;
@@ -218,13 +218,13 @@ KERNEL void evaluatePairs(int n, int groups, GLOBAL const int* RESTRICT plan, GL
 }
 
 /** Row i of M_R times v. */
-DEVICE real4 rowProduct(int i, int groups, GLOBAL const int4* RESTRICT groupRows,
+DEVICE real4 rowProduct(int i, int sizeGroups, GLOBAL const int4* RESTRICT groupRows,
         GLOBAL const fraction4* RESTRICT places, IMAGES GLOBAL const int* RESTRICT kinds,
         GLOBAL const real* RESTRICT selves, GLOBAL const Neighbour* RESTRICT neighbours,
         GLOBAL const int* RESTRICT counts, GLOBAL const real2* RESTRICT pairs,
         GLOBAL const real* RESTRICT geometry, GLOBAL const real4* RESTRICT v) {
     const fraction4 own = places[i];
-    const Row row = rowOf(i, groups, groupRows);
+    const Row row = rowOf(i, sizeGroups, groupRows);
     const real4 mine = v[i];
     const real self = selves[kinds[i]];
     real x = self*mine.x, y = self*mine.y, z = self*mine.z;
@@ -247,12 +247,12 @@ DEVICE real4 rowProduct(int i, int groups, GLOBAL const int4* RESTRICT groupRows
     return make_real4(x, y, z, 0);
 }
 
-#define MATRIX_PARAMETERS int n, int groups, GLOBAL const int4* RESTRICT groupRows, \
+#define MATRIX_PARAMETERS int n, int sizeGroups, GLOBAL const int4* RESTRICT groupRows, \
         GLOBAL const fraction4* RESTRICT places, IMAGES GLOBAL const int* RESTRICT kinds, \
         GLOBAL const real* RESTRICT selves, GLOBAL const Neighbour* RESTRICT neighbours, \
         GLOBAL const int* RESTRICT counts, GLOBAL const real2* RESTRICT pairs, GLOBAL const real* RESTRICT geometry
 #ifdef SUM_IMAGES
-#define ROW_PRODUCT(i, v) rowProduct(i, groups, groupRows, places, images, kinds, selves, neighbours, counts, pairs, geometry, v)
+#define ROW_PRODUCT(i, v) rowProduct(i, sizeGroups, groupRows, places, images, kinds, selves, neighbours, counts, pairs, geometry, v)
 #else
-#define ROW_PRODUCT(i, v) rowProduct(i, groups, groupRows, places, kinds, selves, neighbours, counts, pairs, geometry, v)
+#define ROW_PRODUCT(i, v) rowProduct(i, sizeGroups, groupRows, places, kinds, selves, neighbours, counts, pairs, geometry, v)
 #endif
