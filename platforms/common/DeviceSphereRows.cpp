@@ -90,7 +90,7 @@ double DeviceSphereRows::bytesPerParticle(const Plan& plan, const Lattice& box, 
         entries += sizes.groups[g].count * firstCapacity(sizes, g, plan, box);
     const double entry = (plan.sumImages ? sizeof(mm_int2) : sizeof(int)) + 2 * realSize;
     const double n = plan.mixture->particleRadii().size(), kinds = plan.mixture->radii().size();
-    return (entries * entry + kinds * (1 + MixtureTable::MOST_BASIS) * realSize) / n;
+    return (entries * entry + kinds * (1 + plan.radiusFunctions) * realSize) / n;
 }
 
 /** Tell the device how long rows are. @return entries of all of them */
