@@ -58,10 +58,7 @@ protected:
     virtual void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) = 0;
     /** Fill in what the platform knows of the request: its precision. */
     virtual void adapt(numerics::UnboundedRequest& request) const = 0;
-    /**
-     * A fluid without a boundary, and without a box.
-     * @throws OpenMMException naming the memory needed and available, if the particles do not fit
-     */
+    /** A fluid without a boundary, and without a box. */
     virtual void useUnbounded(const numerics::UnboundedPlan& plan) = 0;
     /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
     virtual void useFreeDraining() = 0;

@@ -83,6 +83,12 @@ struct UnequalSpheres {
     }
 };
 
+/**
+ * Where F and C come from: from the law alone, or with a record of them for later, or from that
+ * record.
+ */
+enum class Scalars { Evaluated, Recorded, Replayed };
+
 /** What the loop over columns needs to know of its row. */
 template <class Real> struct Row {
     Row(const AllPairs<Real>& p, int i, const Real* v)
@@ -114,20 +120,30 @@ HWY_INLINE hn::Vec<D> displacement(D d, Real own, Real ownRest, const Real* HWY_
  * @param v  of the columns; u: sums of the row; w: of the columns
  * @tparam DIAGONAL  only columns beyond the row
  */
-template <bool DIAGONAL, class D, class Law, class V = hn::Vec<D>, class Real = hn::TFromD<D>>
+template <bool DIAGONAL, Scalars SCALARS, class D, class Law, class V = hn::Vec<D>,
+          class Real = hn::TFromD<D>>
 HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row<Real>& row, int j,
-                         V vx, V vy, V vz, V& ux, V& uy, V& uz, V& wx, V& wy, V& wz) {
+                         V vx, V vy, V vz, V& ux, V& uy, V& uz, V& wx, V& wy, V& wz,
+                         Real* HWY_RESTRICT record) {
     const V dx = displacement(d, row.x, row.restX, p.x + j, p.restX + j),
             dy = displacement(d, row.y, row.restY, p.y + j, p.restY + j),
             dz = displacement(d, row.z, row.restZ, p.z + j, p.restZ + j);
-    const V r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
     V F, C;
-    law(d, p, row.i, j, r2, F, C);
-    if constexpr (DIAGONAL) {
-        const int skipped = row.i + 1 - j; // lanes up to the row itself
-        const auto out = hn::FirstN(d, skipped > 0 ? size_t(skipped) : 0);
-        F = hn::IfThenZeroElse(out, F);
-        C = hn::IfThenZeroElse(out, C);
+    if constexpr (SCALARS == Scalars::Replayed) {
+        F = hn::LoadU(d, record);
+        C = hn::LoadU(d, record + hn::Lanes(d));
+    } else {
+        law(d, p, row.i, j, hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz))), F, C);
+        if constexpr (DIAGONAL) {
+            const int skipped = row.i + 1 - j; // lanes up to the row itself
+            const auto out = hn::FirstN(d, skipped > 0 ? size_t(skipped) : 0);
+            F = hn::IfThenZeroElse(out, F);
+            C = hn::IfThenZeroElse(out, C);
+        }
+        if constexpr (SCALARS == Scalars::Recorded) {
+            hn::StoreU(F, d, record);
+            hn::StoreU(C, d, record + hn::Lanes(d));
+        }
     }
     const V ownX = hn::Set(d, row.vx), ownY = hn::Set(d, row.vy), ownZ = hn::Set(d, row.vz);
     const V forRow = hn::Mul(C, hn::MulAdd(dx, vx, hn::MulAdd(dy, vy, hn::Mul(dz, vz))));
@@ -141,9 +157,9 @@ HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row
 }
 
 /** Two rows at once: what is loaded and stored of a column serves both. */
-template <class Law, class Real>
+template <class Law, Scalars SCALARS, class Real>
 void addRowsAny(const AllPairs<Real>& p, int from, int to, const Real* HWY_RESTRICT v,
-                Real* HWY_RESTRICT sums) {
+                Real* HWY_RESTRICT sums, Real* HWY_RESTRICT record) {
     const hn::CappedTag<Real, ALL_PAIRS_LANES> d;
     using V = hn::Vec<decltype(d)>;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -158,8 +174,12 @@ void addRowsAny(const AllPairs<Real>& p, int from, int to, const Real* HWY_RESTR
                     vz = hn::LoadU(d, v + z + j);
             V wx = hn::LoadU(d, sums + j), wy = hn::LoadU(d, sums + y + j),
               wz = hn::LoadU(d, sums + z + j);
-            addPairs<DIAGONAL>(d, law, p, first, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz);
-            addPairs<DIAGONAL>(d, law, p, second, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz);
+            addPairs<DIAGONAL, SCALARS>(d, law, p, first, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz,
+                                        record);
+            addPairs<DIAGONAL, SCALARS>(d, law, p, second, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz,
+                                        record + 2 * lanes);
+            if (SCALARS != Scalars::Evaluated)
+                record += 4 * lanes;
             hn::StoreU(wx, d, sums + j);
             hn::StoreU(wy, d, sums + y + j);
             hn::StoreU(wz, d, sums + z + j);
@@ -178,12 +198,17 @@ void addRowsAny(const AllPairs<Real>& p, int from, int to, const Real* HWY_RESTR
     }
 }
 
+template <class Law, class Real> AllPairsKernels<Real> kernelsOf() {
+    return {addRowsAny<Law, Scalars::Evaluated, Real>, addRowsAny<Law, Scalars::Recorded, Real>,
+            addRowsAny<Law, Scalars::Replayed, Real>};
+}
+
 // Dispatch tables hold functions, not templates: one name per precision.
 AllPairsKernels<float> singleAllPairsKernels(bool equalRadii) {
-    return {equalRadii ? addRowsAny<EqualSpheres, float> : addRowsAny<UnequalSpheres, float>};
+    return equalRadii ? kernelsOf<EqualSpheres, float>() : kernelsOf<UnequalSpheres, float>();
 }
 AllPairsKernels<double> doubleAllPairsKernels(bool equalRadii) {
-    return {equalRadii ? addRowsAny<EqualSpheres, double> : addRowsAny<UnequalSpheres, double>};
+    return equalRadii ? kernelsOf<EqualSpheres, double>() : kernelsOf<UnequalSpheres, double>();
 }
 
 } // namespace HWY_NAMESPACE

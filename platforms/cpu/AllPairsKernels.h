@@ -25,15 +25,35 @@ template <class Real> struct AllPairs {
     const Real* radius; ///< not read if all are 1
 };
 
+/**
+ * Numbers of a record of rows [from, to), from even: F and C of all their pairs, and more, as the
+ * loops run over whole vectors.
+ */
+inline size_t recordSize(int count, int from, int to) {
+    size_t size = 0;
+    for (int i = from; i < to; i += 2) {
+        const int begin = i / ALL_PAIRS_LANES * ALL_PAIRS_LANES;
+        size += 4 * size_t((count - begin + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES + 1) *
+                ALL_PAIRS_LANES;
+    }
+    return size;
+}
+
+/** How products are made that come one after another at the same positions. */
 template <class Real> struct AllPairsKernels {
     /**
      * Add what pairs (i, j), from <= i < to, i < j, make of v, to both: sums += M v.
      * from is even, to is even or count.
-     * @param v     [3][stride], zero from place `count` on
-     * @param sums  [3][stride], of which columns from `from` rounded down to ALL_PAIRS_LANES are
+     * @param v       [3][stride], zero from place `count` on
+     * @param sums    [3][stride], of which columns from `from` rounded down to ALL_PAIRS_LANES are
      * changed; what is added from place `count` on means nothing
+     * @param record  [recordSize()], where one is kept
      */
-    void (*addRows)(const AllPairs<Real>& pairs, int from, int to, const Real* v, Real* sums);
+    using AddRows = void (*)(const AllPairs<Real>& pairs, int from, int to, const Real* v,
+                             Real* sums, Real* record);
+    AddRows addRows;     ///< keeps nothing
+    AddRows recordRows;  ///< the same, and keeps F and C of all pairs
+    AddRows addRecorded; ///< the same from that record
 };
 
 /**

@@ -11,16 +11,11 @@ namespace {
 /// Slabs, and so tasks of threads: enough for many threads, and short sums in single precision;
 /// few for memory, and for the time it takes to add them up.
 constexpr int PARTICLES_PER_SLAB = 64, MOST_SLABS = 64;
+constexpr double MOST_RECORDED = 64e6; ///< bytes: 4000 particles in single precision
 } // namespace
 
 template <class Real> int CpuAllPairs<Real>::slabsFor(int particles) {
     return std::clamp(particles / PARTICLES_PER_SLAB, 1, MOST_SLABS);
-}
-
-template <class Real> double CpuAllPairs<Real>::bytes(double particles, int iterations) {
-    const double vectors =
-        std::min(particles / PARTICLES_PER_SLAB, double(MOST_SLABS)) + iterations;
-    return particles * sizeof(Real) * (3 * (vectors + 6) + 2);
 }
 
 template <class Real>
@@ -31,6 +26,7 @@ CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<doub
       loops(allPairsKernels<Real>(plan.equalRadii)), radius(padded, Real(1)), self(padded, Real(1)),
       sums(slabsFor(count), Vector(3 * size_t(padded))) {
     this->resize(padded);
+    records.resize(sums.size());
     for (int i = 0; i < count; i++) {
         radius[i] = Real(radii[i] / a);
         self[i] = Real(a / radii[i]);
@@ -40,6 +36,10 @@ CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<doub
         rests[c].assign(padded, Real(0));
     }
     divideRows();
+    double bytes = 0;
+    for (int slab = 0; slab < slabsFor(count); slab++)
+        bytes += sizeof(Real) * double(recordSize(count, firstRow[slab], firstRow[slab + 1]));
+    mayRecord = bytes <= MOST_RECORDED;
 }
 
 /** Slabs of about as many pairs each, starting at multiples of ALL_PAIRS_LANES. */
@@ -54,6 +54,7 @@ template <class Real> void CpuAllPairs<Real>::divideRows() {
 }
 
 template <class Real> void CpuAllPairs<Real>::setPositions(const std::vector<Vec3>& x) {
+    recorded = false;
     threads.runBlocks(count, [&](int from, int to, int) {
         for (int i = from; i < to; i++)
             for (int c = 0; c < 3; c++) {
@@ -70,13 +71,19 @@ double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w
     const AllPairs<Real> pairs = {
         count,           padded,          places[0].data(), places[1].data(), places[2].data(),
         rests[0].data(), rests[1].data(), rests[2].data(),  radius.data()};
+    const bool keeps = keepsRecord || recorded;
+    const auto loop = recorded ? loops.addRecorded : keeps ? loops.recordRows : loops.addRows;
     threads.run(static_cast<int>(sums.size()), [&](int slab, int) {
         Vector& mine = sums[slab];
+        if (keeps && !recorded)
+            records[slab].resize(recordSize(count, firstRow[slab], firstRow[slab + 1]));
         for (int c = 0; c < 3; c++)
             std::fill(mine.begin() + c * size_t(padded) + firstRow[slab],
                       mine.begin() + (c + 1) * size_t(padded), Real(0));
-        loops.addRows(pairs, firstRow[slab], firstRow[slab + 1], v.data(), mine.data());
+        loop(pairs, firstRow[slab], firstRow[slab + 1], v.data(), mine.data(),
+             keeps ? records[slab].data() : nullptr);
     });
+    recorded = keeps;
     return this->sumOverTasks([&](int from, int to, int) {
         return addSlabs(from, std::min(to, count), v, s, w, t, out);
     });

@@ -35,6 +35,7 @@ void CpuUnbounded<Real>::computeVelocities(const std::vector<Vec3>* forces, cons
     if (scale.unit == 0)
         return;
     clock.start();
+    pairs.expectMore(scale.noise > 0);
     if (scale.forced) {
         multiply(*forces, scale.unit);
         clock.charge("velocities");

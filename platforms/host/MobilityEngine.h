@@ -58,7 +58,6 @@ public:
     /**
      * The fluid without a boundary.
      * @param radii    of the mobile particles (nm)
-     * @throws OpenMMException naming the memory needed and available, if the particles do not fit
      */
     virtual std::unique_ptr<MobilityEngine>
     createUnbounded(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
