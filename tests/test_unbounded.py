@@ -89,6 +89,7 @@ SCENES = {"chain": equalChain, "mixture": mixture, "faraway": faraway,
           "one": lambda: Spheres([[3.0, -7.0, 900.0]], 0.5),
           "dumbbell": lambda: Spheres([[0, 0, 0], [1.0, 0, 0]], 0.5),
           "three": lambda: Spheres([[0, 0, 0], [0, 0, 0], [0.25, 0, 0]], [0.5, 0.5, 2.0])}
+SINGULAR = ("faraway", "three")  # two equal spheres at one place
 everyScene = pytest.mark.parametrize("name", SCENES)
 
 
@@ -143,7 +144,9 @@ def testNoiseIsTheSymmetricRootTimesTheNoiseOfTheParticles(platformName, name, m
     """
     Not a statistical test: with the z that belong to the seed, sqrt(2 kT dt) M^{1/2} z, to the
     rounding of the root on Reference and to a few tolerances elsewhere (the Lanczos stop is an
-    estimate). All platforms have the same noise, as they all pass this.
+    estimate). All platforms have the same noise, as they all pass this. Coincident spheres have
+    eigenvalues of zero, which the rounding of M in single precision makes 1e-6 of the largest: the
+    root of that stays, although the covariance errs by 1e-6.
     """
     spheres = sceneOf(name, platformName)
     values, vectors = np.linalg.eigh(spheres.mobility(model))
@@ -154,6 +157,8 @@ def testNoiseIsTheSymmetricRootTimesTheNoiseOfTheParticles(platformName, name, m
         _, integrator = context(spheres, platformName, tolerance, model=model)
         samples = integrator.sampleBrownianDisplacements(3).reshape(3, -1)
         allowed = 1e-6 if platformName == "Reference" else 2*tolerance
+        if name in SINGULAR and isDevice(platformName) and not platformName.endswith("double"):
+            allowed = max(allowed, 1e-3)
         for mine, exact in zip(samples, z @ root):
             assert np.linalg.norm(mine - exact) <= allowed*np.linalg.norm(exact)
 

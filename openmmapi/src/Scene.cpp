@@ -71,6 +71,10 @@ void chooseBoundary(const System& system, const PSEBrownianIntegrator& integrato
     const bool automatic = (boundary == PSEBrownianIntegrator::Automatic);
     const bool periodicForce = system.usesPeriodicBoundaryConditions();
     scene.unbounded = (automatic ? !periodicForce : boundary == PSEBrownianIntegrator::Unbounded);
+    if (scene.unbounded &&
+        integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
+        refuse("setMobilityModel(ForceCoupling): this mobility is not available in an unbounded "
+               "fluid; use RotnePragerYamakawa, or setFluidBoundary(Periodic)");
     if (!automatic)
         scene.boundaryReason = "as set by setFluidBoundary";
     else if (periodicForce)

@@ -144,9 +144,20 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
     stepsSinceStart = 0;
 }
 
-void CommonStepKernel::useUnbounded(const UnboundedPlan&) {
-    throw OpenMMException("PSEBrownianIntegrator: an unbounded fluid is not available on devices; "
-                          "use the platform CPU");
+void CommonStepKernel::useUnbounded(const UnboundedPlan& plan) {
+    if (plan.precision == Precision::Double && !realIsDouble(device)) {
+        std::ostringstream message;
+        message << "PSEBrownianIntegrator: the tolerance " << tolerance
+                << " needs double precision, and this Context computes the fluid in single "
+                << "precision (Precision " << precisionName() << "), which serves tolerances down "
+                << "to " << SINGLE_PRECISION_FLOOR
+                << "; set the platform property Precision to double, or loosen the tolerance";
+        throw OpenMMException(message.str());
+    }
+    ContextSelector selector(device);
+    engine.reset(new DeviceUnbounded(programs, static_cast<int>(masses.size()), scene.mobile, plan,
+                                     scene.radii, viscosity, clock));
+    stepsSinceStart = 0;
 }
 
 void CommonStepKernel::useFreeDraining() {

@@ -6,6 +6,7 @@
 // share the kernels, written in OpenMM's Common compute dialect, and all code that launches them.
 
 #include "DeviceEngine.h"
+#include "DeviceUnbounded.h"
 #include "Memory.h"
 #include "StepKernel.h"
 #include "openmm/common/ComputeContext.h"

@@ -108,8 +108,8 @@ DevicePeriodicEngine::DevicePeriodicEngine(DevicePrograms& programs, int particl
                                            const std::vector<int>& mobile, const Plan& plan,
                                            const Lattice& box, double viscosity, StageClock& clock)
     : DeviceEngine(programs, particles, mobile, box, plan.realCutoff,
-                   1 / (6 * M_PI * viscosity * plan.a), DeviceRealSpace::summaryRows(), clock,
-                   sizesOf(plan)),
+                   1 / (6 * M_PI * viscosity * plan.a),
+                   DeviceLanczos::summaryRows(LanczosTridiagonal::REAL_HALF), clock, sizesOf(plan)),
       drag(6 * M_PI * viscosity * plan.a),
       spheres(plan.mixture ? new DeviceSpheres(programs, plan, particles, mobile, places)
                            : nullptr),
@@ -135,7 +135,7 @@ void DevicePeriodicEngine::launch(bool forced, const Thermal* thermal, double no
         context.clearBuffer(u);
     int rows = 0;
     if (noise > 0) {
-        rows = realSpace.startSquareRoot(thermal->real);
+        rows = realSpace.squareRoot().start(thermal->real);
         stages.charge("real-space noise (Lanczos)");
     }
     waveSpace.addVelocities(forced ? &forces : NULL, noise, noise > 0 ? thermal->wave : NoiseKey{},
@@ -153,7 +153,7 @@ void DevicePeriodicEngine::computeVelocities(bool forced, const Thermal* thermal
         launch(forced, thermal, noise);
     }
     if (noise > 0) {
-        realSpace.addSquareRoot(noise, u);
+        realSpace.squareRoot().add(noise, u);
         stages.charge("real-space noise (Lanczos)");
     }
 }

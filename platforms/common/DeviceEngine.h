@@ -88,7 +88,7 @@ public:
                          StageClock& clock);
     void setPositions() override;
     void computeVelocities(bool forced, const Thermal* thermal) override;
-    int lanczosIterations() const override { return realSpace.lanczosIterations(); }
+    int lanczosIterations() const override { return realSpace.squareRoot().lastIterations(); }
 
 private:
     void launch(bool forced, const Thermal* thermal, double noise);

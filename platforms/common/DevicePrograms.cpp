@@ -34,10 +34,15 @@ OpenMM::ComputeProgram DevicePrograms::realSpace(const Defines& defines,
     if (defines.count("MIXTURE") > 0)
         return program("sphereRows",
                        KernelSources::displacement + KernelSources::sphereRows +
-                           KernelSources::realSpace,
+                           KernelSources::realSpace + KernelSources::lanczos,
                        defines, constants);
-    return program("realSpace", KernelSources::displacement + KernelSources::realSpace, defines,
-                   constants);
+    return program("realSpace",
+                   KernelSources::displacement + KernelSources::realSpace + KernelSources::lanczos,
+                   defines, constants);
+}
+
+OpenMM::ComputeProgram DevicePrograms::unbounded(const Defines& defines) {
+    return program("unbounded", KernelSources::unbounded + KernelSources::lanczos, defines, {});
 }
 
 OpenMM::ComputeProgram DevicePrograms::waveSpace(const PlanConstants& constants) {

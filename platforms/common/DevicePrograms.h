@@ -29,6 +29,8 @@ public:
     OpenMM::ComputeProgram particles(bool groups = false);
     /** kernels/realSpace.cc; `defines` may have MIXTURE, for unequal spheres */
     OpenMM::ComputeProgram realSpace(const Defines& defines, const PlanConstants& constants);
+    /** kernels/unbounded.cc */
+    OpenMM::ComputeProgram unbounded(const Defines& defines);
     /** kernels/waves.cc with kernels/waveSpace.cc, or for unequal spheres with sphereSpread.cc */
     OpenMM::ComputeProgram waveSpace(const PlanConstants& constants);
     OpenMM::ComputeProgram sphereSpread(const PlanConstants& constants);

@@ -14,7 +14,6 @@ namespace PSE {
 
 namespace {
 
-constexpr int FIRST_ITERATIONS = 5; ///< of a first step
 /// in radii squared; below, 1/r^2 is not needed and might overflow
 constexpr double SMALLEST_R2 = 1e-30;
 /// of the range, in units of the box: what rounding of fractions may do, and more
@@ -26,16 +25,6 @@ void appendCoefficients(const Polynomial& p, std::vector<double>& all) {
 }
 
 } // namespace
-
-mm_int4 kernelKey(const NoiseKey& key) {
-    return mm_int4(static_cast<int>(key.seed), static_cast<int>(key.stream),
-                   static_cast<int>(uint32_t(key.counter)),
-                   static_cast<int>(uint32_t(key.counter >> 32)));
-}
-
-int DeviceRealSpace::summaryRows() {
-    return 2 * LanczosTridiagonal::MAX_ITERATIONS + 1;
-}
 
 double DeviceRealSpace::bytesPerPair(const Plan& plan) {
     if (plan.mixture)
@@ -50,12 +39,12 @@ double DeviceRealSpace::bytesPerParticle(int realSize) {
 DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
                                  DevicePlaces& places, StepSummary& summary, DeviceSpheres* spheres)
     : context(programs.context()), places(places), summary(summary),
-      lanczosTolerance(plan.lanczosTolerance),
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-      negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
-      reorthogonalise(realIsDouble(this->context)), sumImages(plan.sumImages) {
-    Defines defines = {{"MOST_VECTORS", std::to_string(LanczosTridiagonal::MAX_ITERATIONS)},
-                       {"SMALLEST_R2", context.doubleToString(SMALLEST_R2)}};
+      lanczos(this->context, places, summary, plan.lanczosTolerance,
+              std::max(2 * plan.predictedError, 1e-10), LanczosTridiagonal::REAL_HALF),
+      sumImages(plan.sumImages) {
+    Defines defines = DeviceLanczos::defines(LanczosTridiagonal::REAL_HALF);
+    defines["SMALLEST_R2"] = context.doubleToString(SMALLEST_R2);
     if (sumImages)
         defines["SUM_IMAGES"] = "1";
     else if (isTilted(box))
@@ -66,18 +55,10 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
     const ComputeProgram program =
         sphereRows ? sphereRows->program() : prepareRows(programs, plan, box, defines);
     multiplyReal = DeviceKernel(context, program, "multiplyReal");
-    drawNoise = DeviceKernel(context, program, "drawNoise");
-    expandBasis = DeviceKernel(context, program, "expandBasis");
-    makeOrthogonal = DeviceKernel(context, program, "makeOrthogonal");
-    findOverlaps = DeviceKernel(context, program, "findOverlaps");
-    removeOverlaps = DeviceKernel(context, program, "removeOverlaps");
-    combineBasis = DeviceKernel(context, program, "combineBasis");
-    if (reorthogonalise)
-        overlaps.initialize(context,
-                            LanczosTridiagonal::MAX_ITERATIONS * groupsFor(context, places.count()),
-                            mixedSize(context), "pseOverlaps");
-    coefficients.initialize(context, LanczosTridiagonal::MAX_ITERATIONS, realSize(context),
-                            "pseCoefficients");
+    lanczos.use(program, [this](DeviceKernel& expandBasis, int iteration, ComputeArray& basis,
+                                ComputeArray& partial) {
+        withMatrix(expandBasis, iteration, basis, partial);
+    });
 }
 
 /** Of equal spheres. @return the program that all kernels are from */
@@ -166,57 +147,6 @@ void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments)
 
 void DeviceRealSpace::multiply(ComputeArray& f, ComputeArray& u) {
     withMatrix(multiplyReal, f, u);
-}
-
-int DeviceRealSpace::startSquareRoot(const NoiseKey& key) {
-    noise = key;
-    done = 0;
-    const int expected = iterations > 0 ? iterations : FIRST_ITERATIONS;
-    basis.reserve(context, size_t(expected + 1) * places.count(), 4 * realSize(context),
-                  "pseBasis");
-    drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), *basis,
-              summary.partialSums());
-    iterate(0, expected);
-    return 2 * expected + 1;
-}
-
-void DeviceRealSpace::iterate(int from, int to) {
-    for (int i = from; i < to; i++) {
-        withMatrix(expandBasis, i, *basis, summary.partialSums());
-        const int n = places.count();
-        makeOrthogonal(n, n, i, *basis, summary.partialSums());
-        if (reorthogonalise) {
-            findOverlaps(n, n, i, *basis, overlaps);
-            removeOverlaps(n, n, i, *basis, overlaps, summary.partialSums());
-        }
-    }
-    done = to;
-}
-
-void DeviceRealSpace::addSquareRoot(double amplitude, ComputeArray& u) {
-    LanczosTridiagonal small(lanczosTolerance, negativeTolerance);
-    const auto norm = [this](int i) { return std::sqrt(summary.sum(2 * i)); };
-    for (bool finished = false; !finished;) {
-        const int i = small.iterations();
-        if (i == done) {
-            const size_t needed = size_t(done + 2) * places.count();
-            if (basis.size() < needed) { // more room loses what there is: the same once more
-                iterations = std::min(done + 1 + done / 2, LanczosTridiagonal::MAX_ITERATIONS);
-                startSquareRoot(noise);
-            } else
-                iterate(done, done + 1);
-            summary.read(2 * done + 1);
-        }
-        if (norm(0) == 0)
-            return;
-        finished = small.add(summary.sum(2 * i + 1) / norm(i), norm(i + 1));
-    }
-    iterations = small.iterations();
-    std::vector<double> weights(coefficients.getSize(), 0.0);
-    for (int i = 0; i < iterations; i++)
-        weights[i] = amplitude * norm(0) * small.coefficients()[i] / norm(i);
-    coefficients.upload(weights, true);
-    combineBasis(places.count(), places.count(), iterations, *basis, coefficients, u);
 }
 
 } // namespace PSE
