@@ -27,13 +27,19 @@ MixtureQuadrature::MixtureQuadrature(const Mixture& mixture, double largestDista
         w.push_back(3 / M_PI * rule.weights[i] * mixture.envelope(k[i]));
 }
 
-SmoothScalars MixtureQuadrature::operator()(double r, double ai, double aj) const {
+std::vector<double> MixtureQuadrature::of(double ai, double aj) const {
+    std::vector<double> pair(k.size());
+    for (size_t i = 0; i < k.size(); i++)
+        pair[i] = w[i] * sinc(k[i] * ai) * sinc(k[i] * aj);
+    return pair;
+}
+
+SmoothScalars MixtureQuadrature::at(double r, const std::vector<double>& pair) const {
     SmoothScalars sum = {0, 0};
     for (size_t i = 0; i < k.size(); i++) {
         const BesselRatios j = besselRatios(k[i] * r);
-        const double weight = w[i] * sinc(k[i] * ai) * sinc(k[i] * aj);
-        sum.F += weight * (j.j0 - j.j1x);
-        sum.C += weight * k[i] * k[i] * j.j2x2;
+        sum.F += pair[i] * (j.j0 - j.j1x);
+        sum.C += pair[i] * k[i] * k[i] * j.j2x2;
     }
     return sum;
 }

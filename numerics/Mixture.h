@@ -52,7 +52,10 @@ class MixtureQuadrature {
 public:
     MixtureQuadrature(const Mixture& mixture, double largestDistance);
     /** Radii within those of the mixture. */
-    SmoothScalars operator()(double r, double ai, double aj) const;
+    SmoothScalars operator()(double r, double ai, double aj) const { return at(r, of(ai, aj)); }
+    /** The weights of one pair of radii, for many distances. */
+    std::vector<double> of(double ai, double aj) const;
+    SmoothScalars at(double r, const std::vector<double>& pair) const;
     const std::vector<double>& waveNumbers() const { return k; }
     /** (3/pi) H times the weights of the rule. */
     const std::vector<double>& weights() const { return w; }

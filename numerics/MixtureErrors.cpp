@@ -144,7 +144,7 @@ double MixtureErrors::dropped(const ProlateEnvelope& envelope) const {
 }
 
 double MixtureErrors::realTruncation(const Mixture& mixture) const {
-    constexpr int NODES = 32;
+    constexpr int NODES = 24;
     constexpr double PERIODS = 4; // of the shortest waves: what is left beyond falls fast
     const double end = mixture.largestWaveNumber(), further = PERIODS * 2 * M_PI / end;
     const MixtureQuadrature waves(mixture, mixture.largestRange() + further);
@@ -154,11 +154,12 @@ double MixtureErrors::realTruncation(const Mixture& mixture) const {
         for (int j = 0; j <= i; j++) {
             const double ai = radii[i], aj = radii[j], from = mixture.range(ai, aj);
             const Quadrature rule = gaussLegendre(NODES, from, from + further);
+            const std::vector<double> pair = waves.of(ai, aj);
             double random = 0, coherent = 0;
             for (int q = 0; q < NODES; q++) {
                 const double r = rule.nodes[q], shell = 4 * M_PI * r * r * rule.weights[q];
                 const PairScalars rpy = rpyScalars(r, ai, aj);
-                const SmoothScalars wave = waves(r, ai, aj);
+                const SmoothScalars wave = waves.at(r, pair);
                 const double F = rpy.F - wave.F, G = rpy.G - wave.F - wave.C * r * r;
                 random += shell * (2 * F * F + G * G) / 3;
                 coherent += shell * (2 * F + G) / 3;

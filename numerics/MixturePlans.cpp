@@ -22,8 +22,9 @@ constexpr double BANDWIDTH_STEP = 1.0 / 64; ///< as ProlatePlans
 constexpr double RANGE_FACTOR = 1.08, SMALLEST_RANGE = 1;
 /// in widths of the box, where pairs are summed over images
 constexpr double WIDEST_RANGE = 2;
-/// Hasimoto's: from one xi to the next, and xi times the range between which that is sought
-constexpr double XI_FACTOR = 1.25, SMALLEST_REACH = 0.5, LARGEST_REACH = 7.5;
+/// Hasimoto's: from one xi to the next, the first one in 1/(smallest radius), and about which value
+/// of xi times the range the one that keeps an error is sought
+constexpr double XI_FACTOR = 1.25, LARGEST_XI = 2, REACH_BELOW = 1.5, REACH_ABOVE = 1.5;
 /// beta per support: with the shells of spheres, narrower windows serve
 constexpr double SHAPE_PER_SUPPORT = 2.05;
 /// Nyquist wave number over that of the band, in the closed rule that ranks ranges
@@ -167,8 +168,9 @@ std::shared_ptr<const Mixture> MixturePlans::hasimotoMixture(double xi) const {
     const double given = givenRange();
     if (given > 0)
         return with(given);
-    double low = SMALLEST_REACH / xi, high = LARGEST_REACH / xi;
-    while (high - low > 0.01 * high) {
+    const double usual = std::sqrt(std::log(1 / error));
+    double low = std::max(0.1, usual - REACH_BELOW) / xi, high = (usual + REACH_ABOVE) / xi;
+    while (high - low > 0.02 * high) {
         const double mid = 0.5 * (low + high);
         (errors.realTruncation(*with(mid)) > DROPPED_SHARE * error ? low : high) = mid;
     }
@@ -217,7 +219,7 @@ Plan MixturePlans::cheapest() const {
         return at(given);
     const double width = box.smallestWidth(), smallest = composition.radii.front();
     // From the shortest range on: a wider one only if it is cheaper.
-    const double first = (prolate ? SMALLEST_RANGE * smallest : 4 / smallest),
+    const double first = (prolate ? SMALLEST_RANGE * smallest : LARGEST_XI / smallest),
                  last = WIDEST_RANGE * width;
     Plan best = {};
     double lowest = std::numeric_limits<double>::infinity();
