@@ -2,8 +2,9 @@
 #ifndef OPENMMPSE_TESTS_ENGINESCENES_H_
 #define OPENMMPSE_TESTS_ENGINESCENES_H_
 
-// What the tests of the CPU engine share: differences of velocities, and instruction sets.
+// What the tests of the CPU engine share: velocities and their differences, and instruction sets.
 
+#include "CpuRealSpace.h"
 #include "numerics/Vec3.h"
 #include <cmath>
 #include <hwy/targets.h>
@@ -41,6 +42,23 @@ inline std::vector<int64_t> runnableTargets() {
     for (int64_t all = hwy::SupportedTargets(); all != 0; all &= all - 1)
         targets.push_back(all & -all);
     return targets;
+}
+
+/** M_R f at the positions set last. */
+template <class Real>
+std::vector<PSE::numerics::Vec3> realProduct(PSE::CpuRealSpace<Real>& space,
+                                             const std::vector<PSE::numerics::Vec3>& forces) {
+    const size_t n = forces.size();
+    std::vector<Real> f(3 * n + 1), out(3 * n);
+    for (size_t place = 0; place < n; place++)
+        for (int c = 0; c < 3; c++)
+            f[3 * place + c] = Real(forces[space.order()[place]][c]);
+    space.multiplyAdd(f, 1, f, 0, out);
+    std::vector<PSE::numerics::Vec3> u(n);
+    for (size_t place = 0; place < n; place++)
+        for (int c = 0; c < 3; c++)
+            u[space.order()[place]][c] = out[3 * place + c];
+    return u;
 }
 
 } // namespace engineScenes

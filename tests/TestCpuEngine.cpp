@@ -121,17 +121,7 @@ double realSpaceError(const EngineScene& scene, const std::vector<Vec3>& exact) 
     for (const Vec3& x : scene.positions)
         fractions.push_back(scene.box.wrappedFractional(x));
     space.setPositions(fractions);
-    const size_t n = fractions.size();
-    std::vector<Real> f(3 * n + 1), out(3 * n);
-    for (size_t place = 0; place < n; place++)
-        for (int c = 0; c < 3; c++)
-            f[3 * place + c] = Real(scene.forces[space.order()[place]][c]);
-    space.multiplyAdd(f, 1, f, 0, out);
-    std::vector<Vec3> u(n);
-    for (size_t place = 0; place < n; place++)
-        for (int c = 0; c < 3; c++)
-            u[space.order()[place]][c] = out[3 * place + c];
-    return distance(u, exact) / norm(exact);
+    return distance(realProduct(space, scene.forces), exact) / norm(exact);
 }
 
 /** Largest and root mean square difference of the loops' numbers from those of NoiseText.h. */

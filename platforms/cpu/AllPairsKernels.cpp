@@ -7,6 +7,7 @@
 #define HWY_TARGET_INCLUDE "AllPairsKernels.cpp"
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
+#include "RpyLoops-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -26,9 +27,6 @@ template <class D> HWY_INLINE hn::Vec<D> inverseRoot(D d, hn::Vec<D> r2) {
 #endif
     return hn::Div(hn::Set(d, Real(1)), hn::Sqrt(r2));
 }
-
-/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes.
-template <class Real> constexpr double SMALLEST_R2 = sizeof(Real) == 4 ? 1e-12 : 1e-30;
 
 /**
  * F and C = (G - F)/r^2 of the Rotne-Prager-Yamakawa tensor of spheres of radius 1, by selection
@@ -58,28 +56,9 @@ struct UnequalSpheres {
     template <class D, class Real = hn::TFromD<D>>
     HWY_INLINE void operator()(D d, const AllPairs<Real>& p, int i, int j, hn::Vec<D> r2,
                                hn::Vec<D>& F, hn::Vec<D>& C) const {
-        const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
-        r2 = hn::Max(r2, constant(SMALLEST_R2<Real>));
-        const auto ai = hn::Set(d, p.radius[i]), aj = hn::LoadU(d, p.radius + j);
-        const auto s = inverseRoot(d, r2), s2 = hn::Mul(s, s);
-        const auto sum = hn::Add(ai, aj), difference = hn::Sub(ai, aj),
-                   difference2 = hn::Mul(difference, difference);
-        const auto squares =
-            hn::Mul(constant(0.25), hn::Mul(s2, hn::MulAdd(ai, ai, hn::Mul(aj, aj))));
-        const auto apartF = hn::Mul(s, hn::Add(squares, constant(0.75)));
-        const auto apartC = hn::Mul(s, hn::NegMulAdd(constant(3), squares, constant(0.75)));
-        // of overlapping spheres, times ai aj
-        const auto inverse = hn::Div(constant(1), hn::Mul(ai, aj));
-        const auto scale = hn::Mul(constant(1.0 / 32), hn::Mul(s, s2));
-        const auto skew = hn::MulAdd(constant(3), r2, difference2), gap = hn::Sub(difference2, r2);
-        const auto partF = hn::Mul(
-            inverse, hn::NegMulAdd(hn::Mul(skew, skew), scale, hn::Mul(constant(0.5), sum)));
-        const auto partC =
-            hn::Mul(inverse, hn::Mul(constant(3), hn::Mul(scale, hn::Mul(gap, gap))));
-        const auto apart = hn::Gt(r2, hn::Mul(sum, sum)), inside = hn::Le(r2, difference2);
-        const auto insideF = hn::Mul(inverse, hn::Min(ai, aj));
-        F = hn::IfThenElse(apart, apartF, hn::IfThenElse(inside, insideF, partF));
-        C = hn::Mul(s2, hn::IfThenElse(apart, apartC, hn::IfThenZeroElse(inside, partC)));
+        r2 = hn::Max(r2, hn::Set(d, Real(SMALLEST_R2<Real>)));
+        rpyOfUnequal(d, r2, inverseRoot(d, r2), hn::Set(d, p.radius[i]), hn::LoadU(d, p.radius + j),
+                     F, C);
     }
 };
 

@@ -56,14 +56,23 @@ template <class Real>
 CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads)
     : KrylovVectors<Real>(threads), box(box), a(plan.a), range(plan.realCutoff),
       sumImages(plan.sumImages), candidateRoom(threads.count()) {
+    if (plan.mixture)
+        mixture.reset(new CpuMixturePairs<Real>(plan, threads.count()));
     const Matrix3& v = box.vectors();
     tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
     for (int d = 0; d < 3; d++)
         width[d] = box.width(d);
+    if (mixture)
+        return;
     const RealTable table = makeRealTable(*plan.split, range / a, plan.tableError);
     self = Real(table.self);
     coefficientsF = hornerOrder<Real>(table.F);
     coefficientsC = hornerOrder<Real>(table.C);
+}
+
+template <class Real> double CpuRealSpace<Real>::bytesPerParticle(const Plan& plan) {
+    return 0.5 * sizeof(PairBlock<Real>) + 10 * 3 * sizeof(Real) + 64 +
+           (plan.mixture ? CpuMixturePairs<Real>::bytesPerParticle() : 0);
 }
 
 template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
@@ -80,6 +89,8 @@ template <class Real> void CpuRealSpace<Real>::begin(int particles) {
     cellOf.resize(particles);
     for (auto& axis : axes)
         axis.resize(particles + PAIR_LANES);
+    if (mixture)
+        mixture->begin(particles);
     prepareCells(particles);
 }
 
@@ -124,12 +135,19 @@ void CpuRealSpace<Real>::place(const std::vector<Vec3>& fractions, int from, int
     for (int place = from; place < to; place++)
         for (int d = 0; d < 3; d++)
             axes[d][place] = PairCoordinate<Real>::fromFraction(fractions[particleAt[place]][d]);
+    if (mixture)
+        mixture->place(particleAt, from, to);
 }
 
-/** The runs of places, at most two for each column of cells, that hold all neighbours of s. */
-template <class Real> int CpuRealSpace<Real>::findRuns(const Vec3& s, PairRun* runs) const {
-    const CellInterval x(s[0], reach[0], cellCount[0]), y(s[1], reach[1], cellCount[1]),
-        z(s[2], reach[2], cellCount[2]);
+/**
+ * The runs of places, at most two for each column of cells, that hold all neighbours of s.
+ * @param share  of the largest range, the largest one that s has
+ */
+template <class Real>
+int CpuRealSpace<Real>::findRuns(const Vec3& s, double share, PairRun* runs) const {
+    const double own = share * range;
+    const CellInterval x(s[0], share * reach[0], cellCount[0]),
+        y(s[1], share * reach[1], cellCount[1]), z(s[2], share * reach[2], cellCount[2]);
     const int end = z.from + z.number, last = std::min(end, cellCount[2]),
               wrapped = std::max(end - cellCount[2], 0);
     double y2[MOST_CELLS];
@@ -137,7 +155,7 @@ template <class Real> int CpuRealSpace<Real>::findRuns(const Vec3& s, PairRun* r
         y2[j] = y.squaredDistance(j, s[1], width[1]);
     int n = 0;
     for (int i = 0; i < x.number; i++) {
-        const double left = (1 + 2 * MARGIN) * range * range - x.squaredDistance(i, s[0], width[0]);
+        const double left = (1 + 2 * MARGIN) * own * own - x.squaredDistance(i, s[0], width[0]);
         const int* const row = cellStart.data() + size_t(x.cell(i)) * cellCount[1] * cellCount[2];
         for (int j = 0; j < y.number; j++) {
             if (!tilted && y2[j] >= left)
@@ -161,7 +179,8 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
     const int from = Threads::from(task), to = Threads::to(task, static_cast<int>(rowStart.size()));
     int used = 0;
     for (int i = from; i < to; i++) {
-        const int numRuns = findRuns(fractions[particleAt[i]], runs);
+        const double share = (mixture ? mixture->largestRange(i) * a / range : 1);
+        const int numRuns = findRuns(fractions[particleAt[i]], share, runs);
         size_t candidates = PAIR_LANES;
         for (int r = 0; r < numRuns; r++)
             candidates += runs[r].end - runs[r].begin;
@@ -174,8 +193,10 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
             mine.resize(mine.capacity());
         }
         rowStart[i] = used;
+        PairBlock<Real>* const row = mine.data() + used;
         rowCount[i] =
-            kernels.fillRow(positions, table, i, runs, numRuns, scratch.data(), mine.data() + used);
+            mixture ? mixture->fillRow(thread, positions, i, runs, numRuns, scratch.data(), row)
+                    : kernels.fillRow(positions, table, i, runs, numRuns, scratch.data(), row);
         used += rowCount[i];
     }
 }
@@ -189,17 +210,18 @@ void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) 
     const PairPolynomials<Real> table = polynomials();
     const std::vector<Vec3> images = box.imagesWithin(range);
     const int n = static_cast<int>(fractions.size());
-    threads.run(Threads::blocks(n), [&](int task, int) {
+    threads.run(Threads::blocks(n), [&](int task, int thread) {
         std::vector<PairBlock<Real>>& mine = blocks[task];
         mine.clear();
         for (int i = Threads::from(task); i < Threads::to(task, n); i++) {
             rowStart[i] = static_cast<int32_t>(mine.size());
             int used = PAIR_LANES;
-            for (int j = 0; j < n; j++)
+            for (int j = 0; j < n; j++) {
+                const double own = (mixture ? mixture->range(i, j) * a : range);
                 for (const Vec3& image : images) {
                     const Vec3 d =
                         box.cartesian(fractions[particleAt[i]] - fractions[particleAt[j]]) + image;
-                    if (d.squaredNorm() >= range * range || (i == j && image == Vec3::Zero()))
+                    if (d.squaredNorm() >= own * own || (i == j && image == Vec3::Zero()))
                         continue;
                     if (used == PAIR_LANES) {
                         mine.push_back({});
@@ -211,8 +233,13 @@ void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) 
                     block.dy[used] = Real(d[1] / a);
                     block.dz[used++] = Real(d[2] / a);
                 }
+            }
             rowCount[i] = static_cast<int32_t>(mine.size()) - rowStart[i];
-            kernels.evaluateBlocks(table, rowCount[i], used, mine.data() + rowStart[i]);
+            PairBlock<Real>* const row = mine.data() + rowStart[i];
+            if (mixture)
+                mixture->evaluateRow(thread, i, rowCount[i], used, row);
+            else
+                kernels.evaluateBlocks(table, rowCount[i], used, row);
         }
     });
 }
@@ -236,7 +263,8 @@ template <class Real> PairGeometry<Real> CpuRealSpace<Real>::geometry() const {
 }
 
 template <class Real> PairRows<Real> CpuRealSpace<Real>::rows(int task) const {
-    return {self, rowStart.data(), rowCount.data(), blocks[task].data()};
+    return {self, mixture ? mixture->selves() : nullptr, rowStart.data(), rowCount.data(),
+            blocks[task].data()};
 }
 
 template <class Real>

@@ -2,10 +2,12 @@
 #ifndef OPENMMPSE_CPUREALSPACE_H_
 #define OPENMMPSE_CPUREALSPACE_H_
 
+#include "CpuMixturePairs.h"
 #include "KrylovVectors.h"
 #include "numerics/Lattice.h"
 #include "numerics/Plan.h"
 #include "numerics/Vec3.h"
+#include <memory>
 #include <vector>
 
 namespace PSE {
@@ -24,10 +26,10 @@ public:
     using typename KrylovVectors<Real>::Vector;
 
     CpuRealSpace(const numerics::Plan& plan, const numerics::Lattice& box, const Threads& threads);
-    /** Bytes per particle and neighbour; per particle: half a block unused, ten vectors, places. */
-    static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES,
-                            BYTES_PER_PARTICLE =
-                                0.5 * sizeof(PairBlock<Real>) + 10 * 3 * sizeof(Real) + 64;
+    /** Bytes per particle and neighbour. */
+    static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES;
+    /** Per particle: half a block unused, ten vectors, places, and its radius in a mixture. */
+    static double bytesPerParticle(const numerics::Plan& plan);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts: those of placeParticles(), then
@@ -45,7 +47,7 @@ public:
 private:
     void prepareCells(int particles);
     void fillRowsOf(int task, int thread, const std::vector<numerics::Vec3>& fractions);
-    int findRuns(const numerics::Vec3& s, PairRun* runs) const;
+    int findRuns(const numerics::Vec3& s, double share, PairRun* runs) const;
     void fillRowsWithImages(const std::vector<numerics::Vec3>& fractions);
     PairPolynomials<Real> polynomials() const;
     PairGeometry<Real> geometry() const;
@@ -57,8 +59,9 @@ private:
     numerics::Lattice box;
     double a, range;
     bool sumImages, tilted;
-    double width[3]; ///< distances between opposite faces of the box
-    Real self;
+    double width[3];                                ///< distances between opposite faces of the box
+    std::unique_ptr<CpuMixturePairs<Real>> mixture; ///< NULL for equal radii
+    Real self = 0;                                  ///< of equal radii
     Vector coefficientsF, coefficientsC;
     double reach[3];  ///< of the range, in fractions of the box
     int cellCount[3]; ///< cells along the box vectors

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "PairKernels.h"
 #include "numerics/Rpy.h"
-#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "PairKernels.cpp"
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
+#include "PairLoops-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -65,129 +65,15 @@ void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last,
         evaluateBlock(table, b == count - 1 ? last : PAIR_LANES, blocks[b]);
 }
 
-/** Coordinates of particles that follow each other, as PairCoordinate has them. */
-template <class D> HWY_INLINE auto loadCoordinates(D, const int32_t* HWY_RESTRICT x) {
-    return hn::LoadU(hn::RebindToSigned<D>(), x);
-}
-template <class D> HWY_INLINE auto loadCoordinates(D d, const double* HWY_RESTRICT x) {
-    return hn::LoadU(d, x);
-}
-
-/** Displacements to the nearest images of other particles, in radii. */
-template <class D> class Displacement {
-public:
-    using Real = hn::TFromD<D>;
-    using V = hn::Vec<D>;
-    HWY_INLINE Displacement(D d, const PairGeometry<Real>& g, int i) : d(d), g(g), i(i) {}
-
-    template <class Coordinate>
-    HWY_INLINE void of(Coordinate x, Coordinate y, Coordinate z, V& dx, V& dy, V& dz) const {
-        const V sx = difference(g.x[i], x), sy = difference(g.y[i], y), sz = difference(g.z[i], z);
-        dx = hn::MulAdd(constant(g.box[0]), sx,
-                        hn::MulAdd(constant(g.box[1]), sy, hn::Mul(constant(g.box[3]), sz)));
-        dy = hn::MulAdd(constant(g.box[2]), sy, hn::Mul(constant(g.box[4]), sz));
-        dz = hn::Mul(constant(g.box[5]), sz);
-        if (g.tilted) { // the nearest fractions are not always the nearest image there
-            const V nb = hn::Round(hn::Mul(dy, constant(1 / g.whole[2])));
-            dy = hn::NegMulAdd(nb, constant(g.whole[2]), dy);
-            dx = hn::NegMulAdd(nb, constant(g.whole[1]), dx);
-            const V na = hn::Round(hn::Mul(dx, constant(1 / g.whole[0])));
-            dx = hn::NegMulAdd(na, constant(g.whole[0]), dx);
-        }
-    }
-
-private:
-    HWY_INLINE V constant(Real value) const { return hn::Set(d, value); }
-    /** In units of PairCoordinate; integers wrap around by themselves. */
-    template <class Integers> HWY_INLINE V difference(int32_t own, Integers other) const {
-        const hn::RebindToSigned<D> di;
-        return hn::ConvertTo(d, hn::Sub(hn::Set(di, own), other));
-    }
-    HWY_INLINE V difference(double own, V other) const {
-        const V s = hn::Sub(hn::Set(d, own), other);
-        return hn::Sub(s, hn::Round(s));
-    }
-
-    D d;
-    const PairGeometry<Real>& g;
-    int i;
-};
-
-/** Indices in numbers as wide as a Real: integers, or reals where those have 53 bits. */
-template <class D>
-using IndexTag = std::conditional_t<sizeof(hn::TFromD<D>) == 4, hn::RebindToSigned<D>, D>;
-
-template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int32_t* to) {
-    if constexpr (sizeof(hn::TFromD<DI>) == 4)
-        hn::StoreU(indices, d, to);
-    else {
-        const hn::Rebind<int32_t, DI> narrow;
-        hn::StoreU(hn::DemoteTo(narrow, indices), narrow, to);
-    }
-}
-
-/**
- * Collect the neighbours of particle i among the candidates, without a branch for each of them.
- * @return how many there are
- */
-template <class Real>
-HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, const PairRun* runs, int numRuns,
-                              int32_t* HWY_RESTRICT found) {
-    const hn::CappedTag<Real, PAIR_LANES> d;
-    const IndexTag<decltype(d)> di;
-    using Index = hn::TFromD<decltype(di)>;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    const Displacement<decltype(d)> displacement(d, g, i);
-    const auto range2 = hn::Set(d, g.range * g.range);
-    const auto self = hn::Set(di, Index(i));
-    size_t n = 0;
-    for (int r = 0; r < numRuns; r++)
-        for (int j = runs[r].begin; j < runs[r].end; j += lanes) {
-            hn::Vec<decltype(d)> dx, dy, dz;
-            displacement.of(loadCoordinates(d, g.x + j), loadCoordinates(d, g.y + j),
-                            loadCoordinates(d, g.z + j), dx, dy, dz);
-            const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
-            const auto index = hn::Iota(di, Index(j));
-            const auto candidate =
-                hn::And(hn::Lt(index, hn::Set(di, Index(runs[r].end))), hn::Ne(index, self));
-            const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2)), candidate);
-            storeIndices(di, hn::Compress(index, in), found + n);
-            n += hn::CountTrue(di, in);
-        }
-    return static_cast<int>(n);
-}
-
 template <class Real>
 int fillRowAny(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
                const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
-    const hn::CappedTag<Real, PAIR_LANES> d;
-    const Displacement<decltype(d)> displacement(d, geometry, i);
-    const int n = findNeighbours(geometry, i, runs, numRuns, found);
-    for (int k = n; k < n + PAIR_LANES; k++) // lanes of the last block that no neighbour fills
-        found[k] = i;
-    const int blocks = (n + PAIR_LANES - 1) / PAIR_LANES;
-    for (int b = 0; b < blocks; b++) {
-        PairBlock<Real>& block = row[b];
-        const int begin = b * PAIR_LANES;
-        typename PairCoordinate<Real>::Type x[PAIR_LANES], y[PAIR_LANES], z[PAIR_LANES];
-        for (int k = 0; k < PAIR_LANES; k++) {
-            const int j = found[begin + k];
-            block.offset[k] = 3 * j;
-            x[k] = geometry.x[j];
-            y[k] = geometry.y[j];
-            z[k] = geometry.z[j];
-        }
-        for (size_t k = 0; k < PAIR_LANES; k += hn::Lanes(d)) {
-            hn::Vec<decltype(d)> dx, dy, dz;
-            displacement.of(loadCoordinates(d, x + k), loadCoordinates(d, y + k),
-                            loadCoordinates(d, z + k), dx, dy, dz);
-            hn::StoreU(dx, d, block.dx + k);
-            hn::StoreU(dy, d, block.dy + k);
-            hn::StoreU(dz, d, block.dz + k);
-        }
-        evaluateBlock(table, n - begin < PAIR_LANES ? n - begin : PAIR_LANES, block);
-    }
-    return blocks;
+    const Real range2 = geometry.range * geometry.range;
+    return fillRowWith(
+        geometry, i, [&](auto d, int) HWY_ATTR { return hn::Set(d, range2); },
+        [&](const int32_t*, int used, PairBlock<Real>& block)
+            HWY_ATTR { evaluateBlock(table, used, block); },
+        runs, numRuns, found, row);
 }
 
 /** Sum of v w, accumulated in double. */
@@ -298,10 +184,11 @@ double multiplyRowsAny(const PairRows<Real>& rows, int from, int to, const Real*
                 z = hn::MulAdd(along, dz, hn::MulAdd(F, vz, z));
             }
         const size_t own = 3 * size_t(i);
+        const Real self = (rows.selves == nullptr ? rows.self : rows.selves[i]);
         const Real sum[3] = {hn::GetLane(hn::SumOfLanes(d, x)), hn::GetLane(hn::SumOfLanes(d, y)),
                              hn::GetLane(hn::SumOfLanes(d, z))};
         for (int c = 0; c < 3; c++)
-            out[own + c] = s * (rows.self * v[own + c] + sum[c]) + t * w[own + c];
+            out[own + c] = s * (self * v[own + c] + sum[c]) + t * w[own + c];
     }
     return dotAny(3 * (to - from), v + 3 * size_t(from), out + 3 * size_t(from));
 }

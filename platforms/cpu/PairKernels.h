@@ -44,6 +44,7 @@ template <class Real> struct PairBlock {
  */
 template <class Real> struct PairRows {
     Real self;                     ///< diagonal blocks
+    const Real* selves;            ///< or [n] one for each row; NULL if all are alike
     const int32_t* start;          ///< [n] first PairBlock of a row, from `blocks`
     const int32_t* count;          ///< [n] PairBlocks of a row
     const PairBlock<Real>* blocks; ///< those of the rows asked for
