@@ -26,6 +26,69 @@ template <class Real> struct Chord {
     }
 };
 
+/** Rows at a time whose weights are evaluated: as many chains of dependent operations. */
+constexpr int ROWS = 4;
+
+/** One plane of grid points of one sphere, all that its rows have in common; in units of t. */
+template <class Real> struct SpherePlane {
+    const SphereShape<Real>& shape;
+    const Real* HWY_RESTRICT coefficients;
+    int degree;
+    Real x, left, middle, line, point; ///< `left` of 1 after what the plane takes
+};
+
+/** Where a row lies in units of t: `left` of 1 after what plane and row take, and its middle. */
+template <class Real> struct SphereRow { Real left, centre; };
+
+/** Weights of points from z0 on, counted from the centre of the sphere, in N rows. */
+template <int N, class D, class Real = hn::TFromD<D>>
+HWY_INLINE void evaluateWeights(D d, const SpherePlane<Real>& plane,
+                                const SphereRow<Real>* HWY_RESTRICT rows, Real z0,
+                                hn::Vec<D>* HWY_RESTRICT w) {
+    const auto one = hn::Set(d, Real(1)), least = hn::Set(d, plane.shape.least),
+               point = hn::Set(d, plane.point);
+    hn::Vec<D> t[N];
+    for (int n = 0; n < N; n++) {
+        const auto dz = hn::Iota(d, z0 - rows[n].centre);
+        t[n] = hn::MulAdd(hn::Mul(point, dz), dz, hn::Set(d, 1 - rows[n].left));
+        w[n] = hn::Set(d, plane.coefficients[0]);
+    }
+    hn::Vec<D> capped[N];
+    for (int n = 0; n < N; n++)
+        capped[n] = hn::Min(t[n], one); // its powers stay finite
+    for (int power = 1; power <= plane.degree; power++) {
+        const auto c = hn::Set(d, plane.coefficients[power]);
+        for (int n = 0; n < N; n++)
+            w[n] = hn::MulAdd(w[n], capped[n], c);
+    }
+    for (int n = 0; n < N; n++)
+        w[n] = hn::IfThenElseZero(hn::And(hn::Lt(t[n], one), hn::Gt(t[n], least)), w[n]);
+}
+
+/** All vectors of one row of a sphere that is wider than a vector. */
+template <class D, class Work, class Real = hn::TFromD<D>>
+HWY_INLINE void visitRow(D d, const SpherePlane<Real>& plane, const SphereRow<Real>& row,
+                         Real offset, int extent, Work work) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const Chord<Real> chord(row.centre, std::sqrt(std::max(Real(0), row.left) / plane.point),
+                            offset, extent);
+    int hollow = chord.to, filled = chord.to;
+    // Where a large sphere is hollow: left - point dz^2 > 1 - least.
+    const Real inside = row.left - (1 - plane.shape.least);
+    if (inside > 0) {
+        const Chord<Real> inner(row.centre, std::sqrt(inside / plane.point), offset, chord.to);
+        hollow = inner.from;
+        filled = inner.to;
+    }
+    for (int z = chord.from; z < chord.to; z += lanes) {
+        if (z >= hollow && z < filled)
+            z = filled;
+        hn::Vec<D> w;
+        evaluateWeights<1>(d, plane, &row, offset + z, &w);
+        work(z, w);
+    }
+}
+
 /**
  * Calls work(row, z, weights) for vectors of points of the plane `dx` beyond the first one of a
  * sphere: row y of the grid, points from z on, wherever a weight may not be zero. Spreading and
@@ -34,51 +97,46 @@ template <class Real> struct Chord {
 template <class D, class Work, class Real = hn::TFromD<D>>
 HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx, Work work) {
     const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
-    const Real* HWY_RESTRICT coefficients =
-        g.coefficients + size_t(g.shape[particle]) * (g.degree + 1);
     const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
     const int* HWY_RESTRICT first = g.first + 3 * size_t(particle);
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    const Real x = offset[0] + dx;
-    // In units of t. Left of 1 after what the plane takes, and the row.
-    const Real leftInPlane = 1 - shape.shift - shape.scale * g.plane * x * x;
-    if (leftInPlane <= 0)
+    const Real x = offset[0] + dx, left = 1 - shape.shift - shape.scale * g.plane * x * x;
+    if (left <= 0)
         return;
-    const Real middle = g.skewY * x, line = shape.scale * g.line, point = shape.scale * g.point;
-    const Chord<Real> rows(middle, std::sqrt(leftInPlane / line), offset[1], shape.extent[1]);
-    int row = (first[1] + rows.from) % g.size[1];
-    for (int dy = rows.from; dy < rows.to; dy++, row = (row + 1 == g.size[1] ? 0 : row + 1)) {
-        const Real y = offset[1] + dy;
-        const Real left = leftInPlane - line * (y - middle) * (y - middle);
-        const Real centre = g.skewX * x + g.skewZ * y;
-        int z = 0, end = shape.extent[2], hollow = end, filled = end;
-        if (end > lanes) {
-            const Chord<Real> chord(centre, std::sqrt(std::max(Real(0), left) / point), offset[2],
-                                    end);
-            z = chord.from;
-            end = chord.to;
-            // Where a large sphere is hollow: left - point dz^2 > 1 - least.
-            const Real inside = left - (1 - shape.least);
-            if (inside > 0) {
-                const Chord<Real> inner(centre, std::sqrt(inside / point), offset[2], end);
-                hollow = inner.from;
-                filled = inner.to;
-            }
-        }
-        for (; z < end; z += lanes) {
-            if (z >= hollow && z < filled)
-                z = filled;
-            const auto dz = hn::Iota(d, offset[2] + z - centre);
-            auto t = hn::NegMulAdd(hn::Mul(hn::Set(d, point), dz), dz, hn::Set(d, left));
-            t = hn::Sub(hn::Set(d, Real(1)), t);
-            const auto within =
-                hn::And(hn::Lt(t, hn::Set(d, Real(1))), hn::Gt(t, hn::Set(d, shape.least)));
-            t = hn::Min(t, hn::Set(d, Real(1))); // powers of it stay finite
-            auto w = hn::Set(d, coefficients[0]);
-            for (int power = 1; power <= g.degree; power++)
-                w = hn::MulAdd(w, t, hn::Set(d, coefficients[power]));
-            work(row, first[2] + z, hn::IfThenElseZero(within, w));
-        }
+    const SpherePlane<Real> plane = {shape,
+                                     g.coefficients + size_t(g.shape[particle]) * (g.degree + 1),
+                                     g.degree,
+                                     x,
+                                     left,
+                                     g.skewY * x,
+                                     shape.scale * g.line,
+                                     shape.scale * g.point};
+    const Chord<Real> chord(plane.middle, std::sqrt(left / plane.line), offset[1], shape.extent[1]);
+    const int extent = shape.extent[2];
+    const auto rowAt = [&](int dy) HWY_ATTR {
+        const Real y = offset[1] + dy, fromMiddle = y - plane.middle;
+        return SphereRow<Real>{left - plane.line * fromMiddle * fromMiddle,
+                               g.skewX * x + g.skewZ * y};
+    };
+    int dy = chord.from, row = (first[1] + dy) % g.size[1];
+    const auto next = [&]() HWY_ATTR { row = (row + 1 == g.size[1] ? 0 : row + 1); };
+    if (extent > static_cast<int>(hn::Lanes(d))) {
+        for (; dy < chord.to; dy++, next())
+            visitRow(d, plane, rowAt(dy), offset[2], extent,
+                     [&](int z, auto w) HWY_ATTR { work(row, first[2] + z, w); });
+        return;
+    }
+    for (; dy + ROWS <= chord.to; dy += ROWS) {
+        const SphereRow<Real> rows[ROWS] = {rowAt(dy), rowAt(dy + 1), rowAt(dy + 2), rowAt(dy + 3)};
+        hn::Vec<D> w[ROWS];
+        evaluateWeights<ROWS>(d, plane, rows, offset[2], w);
+        for (int n = 0; n < ROWS; n++, next())
+            work(row, first[2], w[n]);
+    }
+    for (; dy < chord.to; dy++, next()) {
+        const SphereRow<Real> only = rowAt(dy);
+        hn::Vec<D> w;
+        evaluateWeights<1>(d, plane, &only, offset[2], &w);
+        work(row, first[2], w);
     }
 }
 

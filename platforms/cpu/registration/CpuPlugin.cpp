@@ -21,6 +21,7 @@ constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
 class CpuEngineFactory : public EngineFactory {
 public:
     explicit CpuEngineFactory(ThreadPool& pool) : pool(pool) {}
+    bool servesMixtures() const override { return true; }
     void adapt(numerics::PlanRequest& request) const override {
         request.singleFloor = SINGLE_PRECISION_FLOOR;
         request.directSums = false;
