@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Unequal spheres on the CPU: both halves of the mobility against their definitions.
-#include "CpuRealSpace.h"
-#include "CpuWaveSpace.h"
+#include "CpuEngine.h"
 #include "EngineScenes.h"
 #include "numerics/Envelope.h"
 #include <gtest/gtest.h>
@@ -161,6 +160,39 @@ template <class Real> std::vector<Vec3> tabulatedVelocities(const Spheres& scene
     return realProduct(space, scene.forces);
 }
 
+/** A suspension in which every sphere has a radius of its own, planned as a platform does it. */
+Spheres continuousSuspension(int n) {
+    Spheres scene = {"continuous", Lattice::orthorhombic(30, 32, 34), {}, {}, {}, {}};
+    std::mt19937 random(n);
+    std::uniform_real_distribution<double> fraction(0, 1);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < n; i++) {
+        const double s[3] = {fraction(random), fraction(random), fraction(random)};
+        scene.positions.push_back(scene.box.cartesian(Vec3(s[0], s[1], s[2])));
+        scene.forces.push_back(Vec3(normal(random), normal(random), normal(random)));
+        scene.radii.push_back(0.4 + 0.6 * fraction(random));
+    }
+    PlanRequest request = {scene.box, n, 1, 1e-2, true, 1e-5, false, {}};
+    request.radii = scene.radii;
+    scene.plan = makePlan(request);
+    return scene;
+}
+
+template <class Real>
+std::vector<Vec3> engineVelocities(const Spheres& scene, int threads, bool noise = true) {
+    OpenMM::ThreadPool pool(threads);
+    StageClock clock;
+    std::vector<int> indices;
+    for (size_t i = 0; i < scene.radii.size(); i++)
+        indices.push_back(static_cast<int>(i));
+    CpuEngine<Real> engine(scene.plan, scene.box, 1, indices, pool, clock);
+    engine.setPositions(scene.positions);
+    const Thermal thermal = {1, 0.01, {7, Stream::StepReal, 3}, {7, Stream::StepWave, 3}};
+    std::vector<Vec3> u;
+    engine.computeVelocities(&scene.forces, noise ? &thermal : NULL, u);
+    return u;
+}
+
 } // namespace
 
 TEST(CpuMixture, WaveHalfIsTheSumOverWavesOnEveryInstructionSet) {
@@ -192,4 +224,32 @@ TEST(CpuMixture, RealHalfIsItsDefinitionOnEveryInstructionSet) {
                       (3e-6 + 2e-8 * magnified) * norm(exact));
         }
     }
+}
+
+TEST(CpuMixture, BitsDoNotDependOnThreads) {
+    const Spheres scene = continuousSuspension(3000);
+    const std::vector<Vec3> single = engineVelocities<float>(scene, 1),
+                            twice = engineVelocities<double>(scene, 1);
+    for (int threads : {2, 3, 5}) {
+        EXPECT_EQ(engineVelocities<float>(scene, threads), single) << threads << " threads";
+        EXPECT_EQ(engineVelocities<double>(scene, threads), twice) << threads << " threads";
+    }
+    EXPECT_LT(distance(single, twice), 1e-3 * norm(twice));
+}
+
+TEST(CpuMixture, TenThousandRadiiOfTheirOwn) {
+    const Spheres scene = continuousSuspension(10000);
+    ASSERT_GT(scene.plan.mixture->radii().size(), 9900u);
+    Spheres few = scene; // one radius for those within 0.3 %: another table, other kernels
+    for (double& a : few.radii)
+        a = 0.1 * std::pow(1.006, std::round(std::log(a / 0.1) / std::log(1.006)));
+    PlanRequest request = {few.box, 10000, 1, 1e-2, true, 1e-5, false, {}};
+    request.radii = few.radii;
+    few.plan = makePlan(request);
+    EXPECT_LT(few.plan.mixture->radii().size(), 200u);
+    const std::vector<Vec3> u = engineVelocities<float>(scene, 2, false),
+                            v = engineVelocities<float>(few, 2, false);
+    // The mobility of a particle changes by as much as its radius.
+    EXPECT_LT(distance(u, v), 0.01 * norm(u));
+    EXPECT_GT(distance(u, v), 1e-5 * norm(u));
 }
