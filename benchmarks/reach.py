@@ -46,7 +46,7 @@ class Contender:
     """A Context whose steps are timed. `count` particles, `steps` per visit; `model` of the fluid, if there is one."""
 
     def __init__(self, count=SMALL, phi=0.1, tolerance=1e-3, threads=2, repulsion=False, fluid=True, shuffled=True,
-                 steps=None, model=PSEBrownianIntegrator.RotnePragerYamakawa):
+                 steps=None, model=PSEBrownianIntegrator.RotnePragerYamakawa, radii=(), grid=None):
         positions, length = lattice(count, phi, shuffled)
         system = makeSystem(count, length, repulsion)
         if repulsion:  # contacts as the dynamics leaves them
@@ -56,6 +56,10 @@ class Contender:
             positions = settled.getState(positions=True).getPositions(asNumpy=True)
             del settled
         integrator = pse(tolerance, model) if fluid else openmm.BrownianIntegrator(TEMPERATURE, DRAG/MASS, STEP)
+        for i in range(count if radii else 0):
+            integrator.setParticleRadius(i, radii[i % len(radii)])
+        if grid is not None:
+            integrator.setGridDimensions(*grid)
         self.context = context(system, positions, integrator, threads)
         self.count = count
         self.steps = steps or 10
@@ -145,6 +149,17 @@ def benchmarkTimes(options, pattern, *arguments):
     return times, errors
 
 
+def rowRadii(options):
+    """Five radii of one volume against one radius on the grid that the five have chosen."""
+    five = [0.6, 0.8, 1.0, 1.2, 1.4]
+    unit = RADIUS*(sum(a**3 for a in five)/len(five))**(-1/3)
+    mixed = Contender(radii=[unit*a for a in five])
+    grid = mixed.integrator.getNumericalParameters()["gridDimensions"]
+    results = takeTurns([mixed, Contender(grid=grid), Contender()], options.rounds)
+    note = "{} against {} on the same grid, {} on its own".format(*results)
+    return [Result("radii", ratio, results[:2], note)]
+
+
 def rowFft(options):
     times, errors = benchmarkTimes(options, "^(six FFTs|fluid)/", f"--benchmark_repetitions={options.rounds}",
                                    "--benchmark_min_time=0.5", "--benchmark_enable_random_interleaving=true")
@@ -224,7 +239,7 @@ def rowCreation(options):
     return [Result("creation", lambda seconds: seconds, (fluid,), f"{fluid}, of which OpenMM's own {plain}")]
 
 
-ROWS = {"step": rowStep, "draining": rowDraining, "fft": rowFft, "ptps": rowPtps, "large": rowLarge, "phi": rowPhi,
+ROWS = {"step": rowStep, "draining": rowDraining, "radii": rowRadii, "fft": rowFft, "ptps": rowPtps, "large": rowLarge, "phi": rowPhi,
         "tolerance": rowTolerance, "threads": rowThreads, "memory": rowMemory, "creation": rowCreation}
 NEED_PROGRAM = {"fft", "memory"}
 # name: what, must, aim, whether less is better
@@ -233,6 +248,7 @@ TARGETS = {
     "step, in order": ("the same, indices in the order of space", 8, 4, True),
     "draining": ("step with FreeDraining / BrownianIntegrator's", 1.15, 1, True),
     "draining, WCA": ("the same with a repulsion between the spheres", 1.15, 1, True),
+    "radii": ("five radii / equal radii on the same grid", 1.5, 1.2, True),
     "fft": ("hydrodynamic part (Hasimoto) / its six 3-D FFTs", 6, 4, True),
     "ptps": ("hydrodynamic part, particle-steps per second", 1e6, 2e6, False),
     "large": ("PTPS at N = 1,000,000 / at 16,000", 0.6, 0.8, False),

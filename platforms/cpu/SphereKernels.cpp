@@ -68,7 +68,7 @@ HWY_INLINE void evaluateWeights(D d, const SpherePlane<Real>& plane,
 /** All vectors of one row of a sphere that is wider than a vector. */
 template <class D, class Work, class Real = hn::TFromD<D>>
 HWY_INLINE void visitRow(D d, const SpherePlane<Real>& plane, const SphereRow<Real>& row,
-                         Real offset, int extent, Work work) {
+                         Real offset, int extent, int y, int first, Work& work) {
     const int lanes = static_cast<int>(hn::Lanes(d));
     const Chord<Real> chord(row.centre, std::sqrt(std::max(Real(0), row.left) / plane.point),
                             offset, extent);
@@ -85,17 +85,17 @@ HWY_INLINE void visitRow(D d, const SpherePlane<Real>& plane, const SphereRow<Re
             z = filled;
         hn::Vec<D> w;
         evaluateWeights<1>(d, plane, &row, offset + z, &w);
-        work(z, w);
+        work(d, y, first + z, w);
     }
 }
 
 /**
- * Calls work(row, z, weights) for vectors of points of the plane `dx` beyond the first one of a
+ * Calls work(d, row, z, weights) for vectors of points of the plane `dx` beyond the first one of a
  * sphere: row y of the grid, points from z on, wherever a weight may not be zero. Spreading and
  * gathering take the same weights from here.
  */
 template <class D, class Work, class Real = hn::TFromD<D>>
-HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx, Work work) {
+HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx, Work& work) {
     const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
     const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
     const int* HWY_RESTRICT first = g.first + 3 * size_t(particle);
@@ -121,8 +121,7 @@ HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx
     const auto next = [&]() HWY_ATTR { row = (row + 1 == g.size[1] ? 0 : row + 1); };
     if (extent > static_cast<int>(hn::Lanes(d))) {
         for (; dy < chord.to; dy++, next())
-            visitRow(d, plane, rowAt(dy), offset[2], extent,
-                     [&](int z, auto w) HWY_ATTR { work(row, first[2] + z, w); });
+            visitRow(d, plane, rowAt(dy), offset[2], extent, row, first[2], work);
         return;
     }
     for (; dy + ROWS <= chord.to; dy += ROWS) {
@@ -130,15 +129,41 @@ HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx
         hn::Vec<D> w[ROWS];
         evaluateWeights<ROWS>(d, plane, rows, offset[2], w);
         for (int n = 0; n < ROWS; n++, next())
-            work(row, first[2], w[n]);
+            work(d, row, first[2], w[n]);
     }
     for (; dy < chord.to; dy++, next()) {
         const SphereRow<Real> only = rowAt(dy);
         hn::Vec<D> w;
         evaluateWeights<1>(d, plane, &only, offset[2], &w);
-        work(row, first[2], w);
+        work(d, row, first[2], w);
     }
 }
+
+/** Adds the forces of a sphere to three planes. Not a lambda: those are not always in line. */
+template <class D, class Real = hn::TFromD<D>> struct AddForces {
+    size_t rowLength;
+    Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
+    hn::Vec<D> fx, fy, fz;
+    HWY_INLINE void operator()(D d, int row, int column, hn::Vec<D> w) const {
+        const size_t at = row * rowLength + column;
+        hn::StoreU(hn::MulAdd(w, fx, hn::LoadU(d, x + at)), d, x + at);
+        hn::StoreU(hn::MulAdd(w, fy, hn::LoadU(d, y + at)), d, y + at);
+        hn::StoreU(hn::MulAdd(w, fz, hn::LoadU(d, z + at)), d, z + at);
+    }
+};
+
+/** Sums up the velocity of a sphere from three grids. */
+template <class D, class Real = hn::TFromD<D>> struct SumVelocities {
+    size_t rowLength;
+    const Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
+    hn::Vec<D> ux, uy, uz;
+    HWY_INLINE void operator()(D d, int row, int column, hn::Vec<D> w) {
+        const size_t at = row * rowLength + column;
+        ux = hn::MulAdd(w, hn::LoadU(d, x + at), ux);
+        uy = hn::MulAdd(w, hn::LoadU(d, y + at), uy);
+        uz = hn::MulAdd(w, hn::LoadU(d, z + at), uz);
+    }
+};
 
 template <class Real>
 void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
@@ -154,14 +179,14 @@ void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
             if (dx >= g.shapes[g.shape[particle]].extent[0])
                 continue;
             const Real* HWY_RESTRICT force = g.forces + 3 * size_t(particle);
-            const auto fx = hn::Set(d, force[0]), fy = hn::Set(d, force[1]),
-                       fz = hn::Set(d, force[2]);
-            visitPlane(d, g, particle, dx, [&](int row, int z, auto w) HWY_ATTR {
-                const size_t at = row * g.rowLength + z;
-                hn::StoreU(hn::MulAdd(w, fx, hn::LoadU(d, planes[0] + at)), d, planes[0] + at);
-                hn::StoreU(hn::MulAdd(w, fy, hn::LoadU(d, planes[1] + at)), d, planes[1] + at);
-                hn::StoreU(hn::MulAdd(w, fz, hn::LoadU(d, planes[2] + at)), d, planes[2] + at);
-            });
+            AddForces<decltype(d)> add = {g.rowLength,
+                                          planes[0],
+                                          planes[1],
+                                          planes[2],
+                                          hn::Set(d, force[0]),
+                                          hn::Set(d, force[1]),
+                                          hn::Set(d, force[2])};
+            visitPlane(d, g, particle, dx, add);
         }
     }
     for (int c = 0; c < 3; c++)
@@ -177,23 +202,21 @@ void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const g
                Real* HWY_RESTRICT u) {
     const hn::CappedTag<Real, SPHERE_LANES> d;
     for (int particle = from; particle < to; particle++) {
-        auto ux = hn::Zero(d), uy = hn::Zero(d), uz = hn::Zero(d);
+        SumVelocities<decltype(d)> sum = {g.rowLength, nullptr,     nullptr,    nullptr,
+                                          hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         int x = g.first[3 * size_t(particle)];
         for (int dx = 0; dx < g.shapes[g.shape[particle]].extent[0]; dx++) {
-            const size_t plane = x * g.planeLength;
-            visitPlane(d, g, particle, dx, [&](int row, int z, auto w) HWY_ATTR {
-                const size_t at = plane + row * g.rowLength + z;
-                ux = hn::MulAdd(w, hn::LoadU(d, grids[0] + at), ux);
-                uy = hn::MulAdd(w, hn::LoadU(d, grids[1] + at), uy);
-                uz = hn::MulAdd(w, hn::LoadU(d, grids[2] + at), uz);
-            });
+            sum.x = grids[0] + x * g.planeLength;
+            sum.y = grids[1] + x * g.planeLength;
+            sum.z = grids[2] + x * g.planeLength;
+            visitPlane(d, g, particle, dx, sum);
             if (++x == g.size[0])
                 x = 0;
         }
         Real* const out = u + 3 * size_t(particle);
-        out[0] = hn::GetLane(hn::SumOfLanes(d, ux));
-        out[1] = hn::GetLane(hn::SumOfLanes(d, uy));
-        out[2] = hn::GetLane(hn::SumOfLanes(d, uz));
+        out[0] = hn::GetLane(hn::SumOfLanes(d, sum.ux));
+        out[1] = hn::GetLane(hn::SumOfLanes(d, sum.uy));
+        out[2] = hn::GetLane(hn::SumOfLanes(d, sum.uz));
     }
 }
 
