@@ -148,7 +148,8 @@ PSE_GETTER_DOC(getFluidBoundary, int, Get what surrounds the particles.,
     Automatic or Periodic or Unbounded)
 PSE_SETTER_DOC(setFluidBoundary, boundary, int,
     Set what surrounds the particles. Default Automatic.,
-    PSEBrownianIntegrator.Automatic (periodic if any Force is) or .Periodic or .Unbounded,
+    PSEBrownianIntegrator.Automatic (periodic if any Force is; else unbounded) or .Periodic or
+    .Unbounded (infinite solvent by sums over all pairs; no box),
     if it is none of these or a Context exists)
 PSE_GETTER_DOC(getSplit, int, Get how M is divided., AutomaticSplit or Prolate or Hasimoto)
 PSE_SETTER_DOC(setSplit, split, int,

@@ -490,9 +490,6 @@ def testBadFiles(small, files, tmp_path, capsys):
     free = template()
     free.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
     assert "FreeDraining" in messageFor(free, 2)
-    unbounded = template()
-    unbounded.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
-    assert "unbounded" in messageFor(unbounded, 2)
 
 
 def testBadScenes(small):

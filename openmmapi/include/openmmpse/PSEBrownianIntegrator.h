@@ -18,7 +18,7 @@ struct Scene;
 /**
  * The numerical parameters behind one tolerance: what a Context really uses, or, given to
  * setNumericalParameters(), what it shall use. A zero (or empty) entry means "automatic".
- * For a free-draining fluid xi = 0 and the grid is (0, 0, 0).
+ * For a free-draining or unbounded fluid xi = 0 and the grid is (0, 0, 0).
  */
 struct OPENMM_EXPORT_PSE NumericalParameters {
     /// name of the real/wave split: "Prolate" or "Hasimoto", or "none" without one
@@ -74,7 +74,9 @@ public:
         /// periodic if any Force uses periodic boundary conditions, else unbounded
         Automatic = 0,
         Periodic = 1, ///< periodic in the box of the Context, zero mean flow
-        Unbounded = 2 ///< infinite solvent
+        /// infinite solvent, by sums over all pairs: the box plays no part, radii may differ, and a
+        /// step costs time in proportion to N^2
+        Unbounded = 2
     };
     /** How M is divided into a real-space and a wave-space half; none of them shows in M. */
     enum Split : int {

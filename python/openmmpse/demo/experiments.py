@@ -15,7 +15,16 @@ from . import network, polymer, simulate, statistics, theory
 from .results import Curve, Result, Row
 from .simulate import THERMAL_ENERGY as kT
 from .simulate import VISCOSITY, to_infinite
-from .trajectories import FORCE, ONE_STEP, free_rows, long_time_rows, run_conformations, run_replica
+from .trajectories import (
+    FORCE,
+    FREE_FORCE,
+    FREE_STEP,
+    ONE_STEP,
+    free_rows,
+    long_time_rows,
+    run_conformations,
+    run_replica,
+)
 
 RESIDUE_RADIUS = 0.484  #: nm, one bead per residue (Ortega, Amoros and Garcia de la Torre 2011)
 PROTEIN_EDGE = 20.0  #: nm; finite-size correction 29 % of the long-time D, its next order 0.4 % (both are applied)
@@ -65,9 +74,16 @@ def _protein_result(wet, dry, sampling, molecule, x0, linear, facts):
     long, curves, plain = long_time_rows(
         "protein", wet, sampling, molecule.step, correction, short, rigid, "rigid body, dense")
     free = theory.free_draining(len(x0), *beads)
+    # The same snapshots without a box: what the finite-size correction must lead to.
+    infinite = statistics.estimate([value for replica in wet for value in replica.unbounded[0]])
+    infinite = statistics.Estimate(infinite.value, simulate.TOLERANCE * infinite.value)
+    steps = [displacements for replica in wet for displacements in replica.unbounded[1]]
     rows = [
         Row("protein", True, "short", ONE_STEP, one_step, kirkwood, "Kirkwood, dense"),
         Row("protein", True, "short", FORCE, exact, kirkwood, "Kirkwood, dense"),
+        Row("protein", True, "short", FREE_STEP, statistics.one_step_diffusion(steps, molecule.step), exact.value,
+            "periodic, corrected"),
+        Row("protein", True, "short", FREE_FORCE, infinite, exact.value, "periodic, corrected"),
         *long,
         *free_rows("protein", dry, sampling, molecule.step, free, "D0/N", curves),
     ]

@@ -10,12 +10,12 @@ import numpy as np  # noqa: E402
 from matplotlib.collections import EllipseCollection  # noqa: E402
 
 from . import theory  # noqa: E402
-from .trajectories import DISPLACEMENT, DRIFT, FORCE, ONE_STEP  # noqa: E402
+from .trajectories import DISPLACEMENT, DRIFT, FORCE, FREE_FORCE, ONE_STEP  # noqa: E402
 
 # Okabe and Ito's palette: told apart with any colour vision, and in grey.
 WET, DRY, SHARP, THEORY, BAND = "#0072B2", "#D55E00", "#009E73", "#222222", "#E8E3D3"
 EXPERIMENT = (1.0e-10, 1.1e-10)  #: m^2/s, measured for lysozymes in water at 20 C
-MARKERS = {ONE_STEP: "o", FORCE: "D", DISPLACEMENT: "s", DRIFT: "^"}
+MARKERS = {ONE_STEP: "o", FORCE: "D", FREE_FORCE: "P", DISPLACEMENT: "s", DRIFT: "^"}
 SMALL = 9.5  #: points, size of the notes
 STYLE = {"font.size": 11, "axes.titlesize": 12, "axes.titleweight": "bold", "axes.titlelocation": "left",
          "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "legend.fontsize": SMALL}
@@ -82,7 +82,8 @@ def _ladder(axes, protein):
     axes.axvspan(*EXPERIMENT, color=BAND, zorder=0)
     axes.text(EXPERIMENT[1], 2.62, "measured for\nlysozymes", ha="right", va="center", fontsize=SMALL)
     for y, wet, times, _ in levels:
-        rows = [row for row in protein.rows if row.hydrodynamics == wet and times in (None, row.times)]
+        rows = [row for row in protein.rows
+                if row.hydrodynamics == wet and times in (None, row.times) and row.method in MARKERS]
         for offset, row in zip(np.linspace(0.13, -0.13, len(rows)), rows):
             axes.errorbar(_si(row.measured.value), y + offset, xerr=_si(row.measured.error), ms=7, capsize=4, lw=1.8,
                           fmt=MARKERS[row.method], color=WET if wet else DRY, zorder=3)
@@ -99,7 +100,7 @@ def _ladder(axes, protein):
     axes.axvline(free, color=DRY, lw=1, ls=":", zorder=1)
     for method, marker in MARKERS.items():
         axes.plot([], [], marker, ms=7, color="grey", label=method)
-    axes.legend(loc="lower right", bbox_to_anchor=(0.82, 0.0))
+    axes.legend(loc="lower right", bbox_to_anchor=(0.82, 0.0), labelspacing=0.2, borderpad=0.1)
     axes.set(xscale="log", xlim=(2e-12, 2.2e-10), ylim=(-0.6, 2.8), yticks=[level[0] for level in levels],
              yticklabels=[level[3] for level in levels], xlabel="diffusion coefficient (m$^2$/s)",
              title="Protein: the solvent makes the difference")

@@ -58,12 +58,16 @@ class Recorder:
 
 
 class Solvent:
-    """A molecule in water, with or without hydrodynamic interactions, ready to run."""
+    """A molecule in water, with or without hydrodynamic interactions, ready to run.
 
-    def __init__(self, molecule, platform, seed, hydrodynamics=True, tolerance=TOLERANCE):
+    unbounded: in infinite water instead of the molecule's periodic box.
+    """
+
+    def __init__(self, molecule, platform, seed, hydrodynamics=True, tolerance=TOLERANCE, unbounded=False):
         self.molecule, self.hydrodynamics = molecule, hydrodynamics
         self.integrator = openmmpse.PSEBrownianIntegrator(TEMPERATURE, VISCOSITY, molecule.radius, molecule.step)
-        self.integrator.setFluidBoundary(openmmpse.PSEBrownianIntegrator.Periodic)
+        boundaries = openmmpse.PSEBrownianIntegrator
+        self.integrator.setFluidBoundary(boundaries.Unbounded if unbounded else boundaries.Periodic)
         self.integrator.setErrorTolerance(tolerance)
         self.integrator.setRandomNumberSeed(seed)
         if not hydrodynamics:
@@ -93,7 +97,7 @@ class Solvent:
         self.simulation.reporters.clear()
 
     def short_time_diffusion(self):
-        """Exact short-time diffusion coefficient of the centre of mass at the present positions, in this box, nm^2/ps.
+        """Exact short-time diffusion coefficient of the centre of mass at the present positions, in this fluid, nm^2/ps.
 
         A unit force spread evenly over the beads moves their mean by tr(sum_ij M_ij)/(3 N^2), averaged over three
         directions.

@@ -15,6 +15,7 @@ from .simulate import Recorder, Solvent
 
 ONE_STEP, FORCE = "one-step displacements", "velocity under a force"
 DISPLACEMENT, DRIFT = "displacements", "drift correlations"
+FREE_STEP, FREE_FORCE = "one-step, unbounded", "force, unbounded"  #: the first two, in infinite water
 FREE_INTERVAL = 10  #: steps between records without hydrodynamics, where a record costs more than a step
 FREE_SAMPLES, FREE_GROUPS = 1000, 10  #: one-step displacements per replica without hydrodynamics; in groups
 FRAME_INTERVAL = 50  #: steps between frames of the trajectory file
@@ -27,6 +28,7 @@ class Replica(NamedTuple):
     drifts: np.ndarray  #: (records, 3), every step; empty without hydrodynamics
     moments: list  #: (samples, 3) one-step displacements of the centre, one entry per snapshot
     exact: list  #: exact short-time diffusion coefficient in the box, one per snapshot
+    unbounded: tuple  #: lists of both, of the same snapshots in an unbounded fluid
     snapshots: list  #: (N, 3) each
     describe: str  #: what the integrator says of itself
 
@@ -39,7 +41,8 @@ def run_replica(molecule, sampling, start, seed, platform, hydrodynamics=True, t
         if hydrodynamics
         else (FREE_INTERVAL, sampling.free_steps, protocol.COST_FREE_STEP)
     )
-    replica = Replica([], [], [], [], [], "")
+    replica = Replica([], [], [], [], ([], []), [], "")
+    infinite = Solvent(molecule, platform, seed, unbounded=True) if hydrodynamics and sampling.snapshots else None
     solvent.place(start)
     solvent.run(sampling.run_in, cost)
     recorder = Recorder(solvent.integrator, interval, drift=hydrodynamics)
@@ -51,6 +54,8 @@ def run_replica(molecule, sampling, start, seed, platform, hydrodynamics=True, t
         if hydrodynamics and sampling.snapshots:
             replica.snapshots.append(solvent.positions)
             _measure_short_time(solvent, sampling.samples, replica.exact, replica.moments)
+            infinite.place(replica.snapshots[-1])
+            _measure_short_time(infinite, sampling.samples, *replica.unbounded, cost=0)
     if not hydrodynamics:
         replica.moments.extend(np.split(solvent.one_step_displacements(FREE_SAMPLES), FREE_GROUPS))
     return replica._replace(
@@ -68,10 +73,10 @@ def run_conformations(molecule, conformations, samples, seed, platform):
     return exact, moments
 
 
-def _measure_short_time(solvent, samples, exact, moments):
+def _measure_short_time(solvent, samples, exact, moments, cost=1):
     exact.append(solvent.short_time_diffusion())
     moments.append(solvent.one_step_displacements(samples))
-    add_progress(samples * protocol.COST_SAMPLE + 3 * protocol.COST_MOBILITY)
+    add_progress(cost * (samples * protocol.COST_SAMPLE + 3 * protocol.COST_MOBILITY))
 
 
 def long_time_rows(name, replicas, sampling, step, correction, short, expected, label):
