@@ -25,6 +25,36 @@ Lattice Lattice::orthorhombic(double x, double y, double z) {
     return Lattice(Vec3(x, 0, 0), Vec3(0, y, 0), Vec3(0, 0, z));
 }
 
+Lattice Lattice::sheared(double strain) const {
+    const double ax = boxVectors(0, 0);
+    Matrix3 v = boxVectors;
+    for (int d = 1; d < 3; d++) {
+        double& x = v(0, d);
+        x += strain * v(1, d);
+        if (std::fabs(x) > ax)
+            x -= ax * std::nearbyint(x / ax);
+        // compared as OpenMM compares, and exact: subtraction of numbers within a factor of two
+        while (2 * x > ax)
+            x -= ax;
+        while (2 * x < -ax)
+            x += ax;
+    }
+    return Lattice(v.col(0), v.col(1), v.col(2));
+}
+
+Lattice Lattice::mostSheared() const {
+    Matrix3 v = boxVectors;
+    for (int d = 1; d < 3; d++)
+        if (v(1, d) != 0)
+            v(0, d) = 0.5 * v(0, 0);
+    return Lattice(v.col(0), v.col(1), v.col(2));
+}
+
+Lattice Lattice::scaled(double factor) const {
+    const Matrix3 v = factor * boxVectors;
+    return Lattice(v.col(0), v.col(1), v.col(2));
+}
+
 double Lattice::smallestWidth() const {
     return boxVectors.diagonal().minCoeff();
 }

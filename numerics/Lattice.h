@@ -50,6 +50,14 @@ public:
     std::vector<Vec3> imagesWithin(double range) const;
     /** How many lattice vectors imagesWithin() looks at; may exceed any integer. */
     double imageCandidates(double range) const;
+    /**
+     * The box after a shear strain, x += strain y, in reduced form: the same lattice of images,
+     * whichever of its vectors tell of it [T35]. An edge in y has its tilt in [-ax/2, ax/2].
+     */
+    Lattice sheared(double strain) const;
+    /** The box of the longest vectors that sheared() can return for any strain. */
+    Lattice mostSheared() const;
+    Lattice scaled(double factor) const;
     bool operator==(const Lattice& other) const { return boxVectors == other.boxVectors; }
     bool operator!=(const Lattice& other) const { return !(*this == other); }
 

@@ -51,6 +51,11 @@ struct PlanRequest {
     bool singleOnly = false;
     /// of each particle; empty if all have `radius`
     std::vector<double> radii = {};
+    /// The box will move: platforms follow it with the same Plan, as long as no vector gets longer
+    /// than in `box`, and none of the lengths on its diagonal shorter than this factor of that
+    /// there.
+    bool moving = false;
+    double shortest = 1;
 };
 
 /** Everything a platform needs to know about the numerics. */
@@ -77,6 +82,9 @@ struct Plan {
     double windowError;      ///< absolute error allowed in the weights of the window
     double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
     Precision precision;
+    /// made for a box that moves: wave factors are made anew, fast, for each shape of it
+    bool moving;
+    double shortest; ///< PlanRequest::shortest
 
     /** Of the split, whichever there is. */
     std::string splitName() const { return mixture ? mixture->name() : split->name(); }

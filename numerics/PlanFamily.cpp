@@ -61,9 +61,9 @@ Lattice scaledBox(const PlanRequest& r) {
     return Lattice(v.col(0), v.col(1), v.col(2));
 }
 
-/** The share of the budget that the estimates may use up in a box (radii). */
-double boxShare(const Lattice& box) {
-    return box.smallestWidth() < SMALL_BOX ? SMALL_BOX_SHARE : 1;
+/** The share of the budget that the estimates may use up in a box. */
+double boxShare(const PlanRequest& r) {
+    return narrowestWidth(r) / r.radius < SMALL_BOX ? SMALL_BOX_SHARE : 1;
 }
 
 /** Edge of the cube that the particles fill at volume fraction phi, in radii. */
@@ -91,19 +91,24 @@ double shapeFor(double error, int support) {
 }
 
 double volumeFraction(const PlanRequest& r) {
+    const double smallest = r.box.volume() * r.shortest * r.shortest * r.shortest;
     if (!r.radii.empty()) {
         double cubes = 0;
         for (double a : r.radii)
             cubes += a * a * a;
-        return 4.0 / 3 * M_PI * cubes / r.box.volume();
+        return 4.0 / 3 * M_PI * cubes / smallest;
     }
-    return r.numParticles * 4.0 / 3 * M_PI * r.radius * r.radius * r.radius / r.box.volume();
+    return r.numParticles * 4.0 / 3 * M_PI * r.radius * r.radius * r.radius / smallest;
+}
+
+double narrowestWidth(const PlanRequest& r) {
+    return r.shortest * r.box.smallestWidth();
 }
 
 PlanFamily::PlanFamily(const PlanRequest& request, double share)
-    : request(request), box(scaledBox(request)), error(share * request.tolerance * boxShare(box)),
-      meanPhi(volumeFraction(request)), phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)),
-      extent(extentOf(request, phi)) {}
+    : request(request), box(scaledBox(request)),
+      error(share * request.tolerance * boxShare(request)), meanPhi(volumeFraction(request)),
+      phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)), extent(extentOf(request, phi)) {}
 
 double PlanFamily::waveErrorOf(const Plan& plan) const {
     return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi,
@@ -143,10 +148,12 @@ double PlanFamily::cost(const Plan& plan) const {
 
 void PlanFamily::completeRealHalf(Plan& plan) const {
     const PlanOverrides& wish = request.overrides;
-    plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE * request.box.smallestWidth();
+    plan.moving = request.moving;
+    plan.shortest = request.shortest;
+    plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE * narrowestWidth(request);
     plan.lanczosTolerance =
         (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5 * request.tolerance);
-    plan.tableError = TABLE_SHARE * request.tolerance * boxShare(box);
+    plan.tableError = TABLE_SHARE * request.tolerance * boxShare(request);
     const bool single = request.tolerance >= request.singleFloor &&
                         (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
     plan.precision = (single ? Precision::Single : Precision::Double);
@@ -198,7 +205,8 @@ bool PlanFamily::fitGrid(Plan& plan, double unit, double& wave) const {
         return waveErrorOf(plan);
     };
     // In small boxes, with few modes, the estimate alone is not to be trusted with coarser grids.
-    double low = (box.smallestWidth() < SMALL_BOX ? 1 : COARSEST), high = FINEST;
+    double low = (narrowestWidth(request) / request.radius < SMALL_BOX ? 1 : COARSEST),
+           high = FINEST;
     const auto widest = [&] {
         const std::array<int, 3> grid = gridFor(high * unit, plan.windowSupport);
         return *std::max_element(grid.begin(), grid.end());
@@ -260,7 +268,7 @@ std::string PlanFamily::windowRefusal(const Plan& plan, double wave) const {
 }
 
 HasimotoPlans::HasimotoPlans(const PlanRequest& request) : PlanFamily(request, BUDGET_PER_HALF) {
-    if (box.smallestWidth() < TINY_BOX)
+    if (narrowestWidth(request) / request.radius < TINY_BOX)
         error *= TINY_BOX_SHARE;
 }
 

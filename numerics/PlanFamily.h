@@ -25,6 +25,8 @@ constexpr int LARGEST_SUPPORT = 16; ///< what platforms have room for
 constexpr double FINEST = 2.2;
 
 double volumeFraction(const PlanRequest& request);
+/** Of the smallest box that the Plan must serve, in nm. */
+double narrowestWidth(const PlanRequest& request);
 /** @throws std::invalid_argument naming what cannot be */
 void checkPlan(const Plan& plan, const PlanRequest& request);
 

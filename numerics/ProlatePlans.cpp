@@ -37,7 +37,7 @@ double unitOf(const Plan& plan) {
 }
 
 double largestRange(const PlanRequest& request) {
-    return LARGEST_LIST_RANGE * request.box.smallestWidth();
+    return LARGEST_LIST_RANGE * narrowestWidth(request);
 }
 
 } // namespace
@@ -93,7 +93,7 @@ std::string ProlatePlans::obstacleTo(double R) const {
                 << " nm are not those of one prolate range (xi = 1/cutoff); prescribe one of them";
     else if (R > 0 && a * R > largest)
         message << "a prolate range of " << a * R << " nm is more than " << LARGEST_LIST_RANGE
-                << " of the smallest box width " << request.box.smallestWidth()
+                << " of the smallest box width " << narrowestWidth(request)
                 << " nm; use a larger splitting parameter (1/range) or a larger box";
     else if (request.overrides.bandwidth > 0)
         message << "a prolate bandwidth of " << request.overrides.bandwidth
@@ -103,7 +103,7 @@ std::string ProlatePlans::obstacleTo(double R) const {
         message << "at tolerance " << request.tolerance
                 << " the prolate split needs a range of at least " << smallest
                 << " nm, which is more than " << LARGEST_LIST_RANGE << " of the smallest box width "
-                << request.box.smallestWidth() << " nm; use a larger box or a looser tolerance";
+                << narrowestWidth(request) << " nm; use a larger box or a looser tolerance";
     else
         message << "a prolate range of " << a * R << " nm is below the " << smallest
                 << " nm that tolerance " << request.tolerance

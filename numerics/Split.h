@@ -74,6 +74,8 @@ public:
      */
     double realCutoff(double error, double phi, double meanPhi) const;
     double realCutoff(double error, double phi) const { return realCutoff(error, phi, phi); }
+    /** Beyond, w is zero or below 1e-17. */
+    virtual double largestWaveNumber() const = 0;
 
 protected:
     /** Int W^2/k^2 dk and Int W dk over wave numbers that are left out. */
@@ -91,8 +93,6 @@ protected:
     DroppedWaves integrateWaves(
         double from, double to,
         const std::function<double(double)>& share = [](double) { return 1.0; }) const;
-    /** Beyond, w is zero or below 1e-17. */
-    virtual double largestWaveNumber() const = 0;
 
 private:
     double errorOf(const DroppedWaves& dropped, double phi) const;

@@ -115,8 +115,36 @@ PSE_SETTER_DOC(setStepSize, size, Quantity or float,
 PSE_GETTER_DOC(getShearRate, Quantity, Get the shear rate of the undisturbed flow.,
     rate (in 1/ps) of the flow (rate*y 0 0))
 PSE_SETTER_DOC(setShearRate, rate, Quantity or float,
-    Set the shear rate of the undisturbed flow (rate*y 0 0). It takes effect at the next step.,
-    rate (in 1/ps), if it is not finite; shear is refused when a Context is created)
+    Set the shear rate of the undisturbed flow (rate*y 0 0). It takes effect at the next step; y is
+    the coordinate that the Context reports. The box tilts with the flow and flips back at half tilt.
+    On OpenCL and CUDA the default box of the System must be tilted: a small tilt will do.,
+    rate (in 1/ps), if it is not finite or the Context cannot be sheared)
+PSE_GETTER_DOC(getShearProtocol, int, Get how the shear rate depends on the time of the Context.,
+    SteadyShear or OscillatoryShear or StartUpShear)
+PSE_GETTER_DOC(getShearTime, Quantity, Get the time of the shear protocol., time (in ps))
+%feature("docstring") PSE::PSEBrownianIntegrator::setShearProtocol %{
+Set how the shear rate depends on the time t of the Context. It takes effect at the next step.
+
+A step takes the exact integral of the rate over its length.
+
+Parameters
+----------
+protocol : int
+    SteadyShear (the default): the rate of setShearRate() at all times; OscillatoryShear: that times
+    cos(2 pi t/time); StartUpShear: none before t = time, that from then on
+time : Quantity or float
+    period or start (in ps); not used by SteadyShear
+
+Raises
+------
+TypeError
+    if time is a Quantity of another dimension, or protocol not an integer
+openmm.OpenMMException
+    if the protocol is unknown, the time not finite, or a period not positive
+%}
+PSE_GETTER_DOC(getStrain, float,
+    Get the strain of all sheared steps so far. Checkpoints and States with integrator parameters
+    hold it., integral of the shear rate over time (dimensionless))
 PSE_GETTER_DOC(getErrorTolerance, float,
     Get the relative error allowed in M f and in the covariance of the noise.,
     tolerance (dimensionless))

@@ -132,6 +132,13 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 %feature("pythonappend") PSE::PSEBrownianIntegrator::getParticleRadii %{
     val = {index: unit.Quantity(radius, unit.nanometer) for index, radius in val.items()}
 %}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::getShearTime %{
+    val = unit.Quantity(val, unit.picosecond)
+%}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::setShearProtocol %{
+    protocol = integer(protocol, "protocol")
+    time = inUnit(time, unit.picosecond, "time")
+%}
 %feature("pythonprepend") PSE::PSEBrownianIntegrator::setGridDimensions %{
     nx, ny, nz = integer(nx, "nx"), integer(ny, "ny"), integer(nz, "nz")
 %}

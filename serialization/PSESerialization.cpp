@@ -58,6 +58,8 @@ public:
         node.setDoubleProperty("constraintTolerance", integrator.getConstraintTolerance());
         node.setDoubleProperty("errorTolerance", integrator.getErrorTolerance());
         node.setDoubleProperty("shearRate", integrator.getShearRate());
+        node.setIntProperty("shearProtocol", integrator.getShearProtocol());
+        node.setDoubleProperty("shearTime", integrator.getShearTime());
         node.setIntProperty("mobilityModel", integrator.getMobilityModel());
         node.setIntProperty("fluidBoundary", integrator.getFluidBoundary());
         node.setIntProperty("split", integrator.getSplit());
@@ -85,6 +87,10 @@ public:
         integrator->setConstraintTolerance(node.getDoubleProperty("constraintTolerance"));
         integrator->setErrorTolerance(node.getDoubleProperty("errorTolerance"));
         integrator->setShearRate(node.getDoubleProperty("shearRate"));
+        integrator->setShearProtocol(
+            static_cast<PSEBrownianIntegrator::ShearProtocol>(
+                node.getIntProperty("shearProtocol", PSEBrownianIntegrator::SteadyShear)),
+            node.getDoubleProperty("shearTime", 0));
         integrator->setMobilityModel(static_cast<PSEBrownianIntegrator::MobilityModel>(
             node.getIntProperty("mobilityModel")));
         integrator->setFluidBoundary(static_cast<PSEBrownianIntegrator::FluidBoundary>(

@@ -61,10 +61,9 @@ public:
     vector<PSE::StageTime> getStageTimes() const override { return {}; }
     void createCheckpoint(std::ostream&) const override {}
     void loadCheckpoint(std::istream&) override { throw OpenMMException("refused"); }
-    void getCounters(unsigned long long& step, unsigned long long& sample) const override {
-        step = sample = 0;
-    }
-    void setCounters(unsigned long long, unsigned long long) override {}
+    PSE::StepState getStepState() const override { return {}; }
+    double getStrain() const override { return 0; }
+    void setStepState(const PSE::StepState&) override {}
 
 private:
     int& heard;

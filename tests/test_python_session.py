@@ -36,6 +36,7 @@ def odd():
     integrator.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
     integrator.setFluidBoundary(PSEBrownianIntegrator.Periodic)
     integrator.setShearRate(-1e-5 / 3)
+    integrator.setShearProtocol(PSEBrownianIntegrator.StartUpShear, 7 / 3)
     integrator.setNumericalParameters(
         {
             "xi": 10 / 3,
@@ -56,7 +57,7 @@ def odd():
 def settings(integrator):
     """Everything that can be set, by name of the getter. Quantities compare exactly."""
     getters = [name for name in dir(integrator) if name.startswith("get")]
-    bound = ("getNumericalParameters",)
+    bound = ("getNumericalParameters", "getStrain")
     needArgument = ("getParticleRadius",)
     return {
         name: getattr(integrator, name)() for name in getters if name not in bound + needArgument

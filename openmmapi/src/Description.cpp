@@ -73,6 +73,30 @@ void describeRadii(std::ostream& out, const Scene& scene, const NumericalParamet
     out << endl;
 }
 
+void describeShear(std::ostream& out, const Scene& scene, const PSEBrownianIntegrator& integrator,
+                   double strain) {
+    using Pse = PSEBrownianIntegrator;
+    const double time = integrator.getShearTime();
+    out << "shear flow: ";
+    if (integrator.getShearRate() == 0)
+        out << "off (shear rate 0";
+    else {
+        out << "on (rate " << integrator.getShearRate() << " /ps";
+        if (integrator.getShearProtocol() == Pse::OscillatoryShear)
+            out << " at the peak, oscillatory with period " << time << " ps";
+        else if (integrator.getShearProtocol() == Pse::StartUpShear)
+            out << " from time " << time << " ps on";
+        else
+            out << ", steady";
+        out << (scene.periodicBox ? ", the box tilts with it" : ", no box");
+    }
+    if (integrator.getShearRate() != 0 || strain != 0)
+        out << ", strain so far " << strain;
+    out << ")" << endl;
+    if (!scene.barostat.empty())
+        out << "box: moved by a " << scene.barostat << endl;
+}
+
 void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
     double total = 0;
     for (const StageTime& stage : stages)
@@ -95,7 +119,7 @@ void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
 
 std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator,
                           const NumericalParameters& parameters,
-                          const std::vector<StageTime>& stages) {
+                          const std::vector<StageTime>& stages, double strain) {
     std::ostringstream out;
     out << std::setprecision(4);
     const double a = scene.radii.empty() ? integrator.getRadius() : scene.radii[0];
@@ -112,7 +136,7 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
         out << "thermal noise: on (temperature above 0), seed " << parameters.randomSeed << endl;
     else
         out << "thermal noise: off (temperature 0)" << endl;
-    out << "shear flow: off (shear rate 0)" << endl;
+    describeShear(out, scene, integrator, strain);
     out << "particles: " << scene.mobile.size() << " mobile, " << scene.numMassless
         << " massless (they do not move and are transparent to the fluid)" << endl;
     describeRadii(out, scene, parameters);

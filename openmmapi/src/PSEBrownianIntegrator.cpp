@@ -19,6 +19,8 @@ namespace {
 constexpr double SMALLEST_TOLERANCE = 1e-10, LARGEST_TOLERANCE = 1e-1;
 constexpr int SMALLEST_SUPPORT = 3, LARGEST_SUPPORT = 16;
 constexpr double SMALLEST_BANDWIDTH = 3, LARGEST_BANDWIDTH = 30;
+/// the entries of a box in a State, row by row
+constexpr const char* BOX_ENTRIES[3][3] = {{"ax"}, {"bx", "by"}, {"cx", "cy", "cz"}};
 
 [[noreturn]] void refuse(const string& message) {
     throw OpenMMException("PSEBrownianIntegrator: " + message);
@@ -143,12 +145,23 @@ void PSEBrownianIntegrator::setShearRate(double rate) {
         refuse(message.str());
     }
     if (context != NULL && rate != 0) {
-        std::ostringstream message;
-        message << "setShearRate(" << rate
-                << "): shear flow is not available; leave the shear rate at 0";
-        refuse(message.str());
+        requireShear(*scene);
+        kernel.getAs<IntegratePSEStepKernel>().requireShear(*context);
     }
     shearRate = rate;
+}
+
+void PSEBrownianIntegrator::setShearProtocol(ShearProtocol protocol, double time) {
+    requireInRange("shear protocol", protocol, SteadyShear, StartUpShear);
+    if (protocol == OscillatoryShear)
+        requirePositive("period of the shear", time, "ps");
+    if (!std::isfinite(time)) {
+        std::ostringstream message;
+        message << "time of the shear protocol is " << time << " ps; it must be finite";
+        refuse(message.str());
+    }
+    shearProtocol = protocol;
+    shearTime = time;
 }
 
 void PSEBrownianIntegrator::setSplit(Split value) {
@@ -307,10 +320,16 @@ NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
     return kernel.getAs<const IntegratePSEStepKernel>().getNumericalParameters();
 }
 
+double PSEBrownianIntegrator::getStrain() const {
+    requireBound("getStrain");
+    return kernel.getAs<const IntegratePSEStepKernel>().getStrain();
+}
+
 string PSEBrownianIntegrator::describe() const {
     requireBound("describe");
     const IntegratePSEStepKernel& step = kernel.getAs<const IntegratePSEStepKernel>();
-    return describeScene(*scene, *this, step.getNumericalParameters(), step.getStageTimes());
+    return describeScene(*scene, *this, step.getNumericalParameters(), step.getStageTimes(),
+                         step.getStrain());
 }
 
 void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
@@ -324,11 +343,19 @@ void PSEBrownianIntegrator::loadCheckpoint(std::istream& stream) {
 }
 
 void PSEBrownianIntegrator::serializeParameters(SerializationNode& node) const {
-    unsigned long long step, sample;
-    kernel.getAs<const IntegratePSEStepKernel>().getCounters(step, sample);
+    const StepState state = kernel.getAs<const IntegratePSEStepKernel>().getStepState();
     node.setIntProperty("version", 1);
-    node.setStringProperty("noiseStep", std::to_string(step));
-    node.setStringProperty("noiseSample", std::to_string(sample));
+    node.setStringProperty("noiseStep", std::to_string(state.step));
+    node.setStringProperty("noiseSample", std::to_string(state.sample));
+    node.setDoubleProperty("strain", state.strain);
+    if (state.plannedBox[0][0] == 0)
+        return;
+    SerializationNode& planned = node.createChildNode("PlannedBox");
+    for (int d = 0; d < 3; d++)
+        for (int c = 0; c <= d; c++)
+            planned.setDoubleProperty(BOX_ENTRIES[d][c], state.plannedBox[d][c]);
+    planned.setBoolProperty("moves", state.plannedToMove);
+    planned.setDoubleProperty("shortest", state.plannedShortest);
 }
 
 void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node) {
@@ -341,9 +368,20 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
         refuse("the integrator parameters in this State have version " +
                std::to_string(node.getIntProperty("version")) +
                "; this version of openmmpse reads version 1");
-    kernel.getAs<IntegratePSEStepKernel>().setCounters(
-        counter(node.getStringProperty("noiseStep")),
-        counter(node.getStringProperty("noiseSample")));
+    StepState state;
+    state.step = counter(node.getStringProperty("noiseStep"));
+    state.sample = counter(node.getStringProperty("noiseSample"));
+    state.strain = node.getDoubleProperty("strain", 0);
+    for (const SerializationNode& planned : node.getChildren()) {
+        if (planned.getName() != "PlannedBox")
+            continue;
+        for (int d = 0; d < 3; d++)
+            for (int c = 0; c <= d; c++)
+                state.plannedBox[d][c] = planned.getDoubleProperty(BOX_ENTRIES[d][c]);
+        state.plannedToMove = planned.getBoolProperty("moves");
+        state.plannedShortest = planned.getDoubleProperty("shortest");
+    }
+    kernel.getAs<IntegratePSEStepKernel>().setStepState(state);
 }
 
 } // namespace PSE

@@ -41,10 +41,6 @@ void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) 
                    "constraints=None, rigidWater=False)";
         refuse(message.str());
     }
-    for (int i = 0; i < system.getNumForces(); i++)
-        if (const char* name = nameOfBarostat(system.getForce(i)))
-            refuse(string("the System has a ") + name +
-                   ", and boxes that a barostat moves are not available; remove that Force");
     for (const auto& own : integrator.getParticleRadii())
         if (own.first >= system.getNumParticles()) {
             std::ostringstream message;
@@ -55,12 +51,6 @@ void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) 
 }
 
 void checkSettings(const PSEBrownianIntegrator& integrator) {
-    if (integrator.getShearRate() != 0) {
-        std::ostringstream message;
-        message << "setShearRate(" << integrator.getShearRate()
-                << "): shear flow is not available; leave the shear rate at 0";
-        refuse(message.str());
-    }
     if (integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
         refuse("setMobilityModel(ForceCoupling): this mobility is not available; use "
                "RotnePragerYamakawa or FreeDraining");
@@ -92,10 +82,22 @@ bool equalRadii(const Scene& scene) {
 
 } // namespace
 
+void requireShear(const Scene& scene) {
+    if (!scene.barostat.empty())
+        refuse("setShearRate: the System has a " + scene.barostat +
+               ", and a box cannot be sheared and moved by a barostat at once; remove that Force, "
+               "or set the shear rate to 0");
+}
+
 Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
     checkSystem(system, integrator);
     checkSettings(integrator);
     Scene scene;
+    for (int i = 0; i < system.getNumForces(); i++)
+        if (const char* name = nameOfBarostat(system.getForce(i)))
+            scene.barostat = name;
+    if (integrator.getShearRate() != 0)
+        requireShear(scene);
     for (int i = 0; i < system.getNumParticles(); i++) {
         if (system.getParticleMass(i) == 0) {
             scene.numMassless++;
@@ -112,6 +114,8 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
                             (equalRadii(scene) ? "equal radii" : "unequal radii");
     } else
         scene.modelReason = "setMobilityModel(FreeDraining) was called";
+    scene.periodicBox =
+        (scene.hydrodynamics && !scene.unbounded) || system.usesPeriodicBoundaryConditions();
     return scene;
 }
 

@@ -8,6 +8,9 @@
 
 namespace PSE {
 
+/// the stage of what a box costs that moves, beside the rest of a step
+constexpr char MOVING_BOX[] = "wave factors of the moving box";
+
 /** Stage times, in the order in which the stages first ran. */
 class StageClock {
 public:

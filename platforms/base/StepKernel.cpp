@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "StepKernel.h"
+#include "numerics/ShearFlow.h"
 #include "openmmpse/internal/Units.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
 #include "openmm/internal/OSRngSeed.h"
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <sstream>
@@ -19,13 +21,19 @@ namespace PSE {
 
 namespace {
 
-constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 1";
+constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 2";
 /// Boxes from the origin: there a position is known to 1e-7 of the box.
 constexpr double FARTHEST = 1e9;
 /// Radii that rounding of a coordinate may be, in an unbounded fluid: 1e-7 at 1e9 radii from the
 /// origin in double precision; in single precision a tenth at 2e6.
 constexpr double FINEST_PLACE = 1e-7, COARSEST_PLACE = 0.1, SINGLE_EPSILON = 1e-8;
 constexpr uint64_t LARGEST_COUNTER = uint64_t(1) << 48;
+/// A box that moves is planned with this room for longer and for shorter vectors [T37].
+constexpr double GROWTH = 1.03, SHRINKAGE = 0.97;
+/// A change by less than this, of an entry relative to the diagonal one in its row, is that of a
+/// box that moves; a larger one sets another box once and for all.
+constexpr double SMALL_CHANGE = 0.1;
+constexpr double ROUNDING = 1e-12;
 
 template <class T> void write(std::ostream& stream, const T& value) {
     stream.write(reinterpret_cast<const char*>(&value), sizeof(T));
@@ -51,6 +59,37 @@ SplitChoice choiceOf(PSEBrownianIntegrator::Split split) {
     default:
         return SplitChoice::Automatic;
     }
+}
+
+ShearFlow flowOf(const PSEBrownianIntegrator& integrator) {
+    using Protocol = ShearFlow::Protocol;
+    const auto protocol = integrator.getShearProtocol();
+    return {protocol == PSEBrownianIntegrator::OscillatoryShear ? Protocol::Oscillatory
+            : protocol == PSEBrownianIntegrator::StartUpShear   ? Protocol::StartUp
+                                                                : Protocol::Steady,
+            integrator.getShearRate(), integrator.getShearTime()};
+}
+
+/** Whether what was planned for keeps its promises in a box, too [T37]. */
+bool serves(const PlanRequest& planned, const Lattice& box) {
+    if (!planned.moving)
+        return box == planned.box;
+    for (int d = 0; d < 3; d++) {
+        const double shortest = planned.shortest * planned.box.vectors()(d, d);
+        if (box.length(d) > (1 + ROUNDING) * planned.box.length(d) ||
+            box.vectors()(d, d) < (1 - ROUNDING) * shortest)
+            return false;
+    }
+    return true;
+}
+
+bool isSmallChange(const Lattice& from, const Lattice& to) {
+    for (int row = 0; row < 3; row++)
+        for (int column = row; column < 3; column++)
+            if (std::fabs(to.vectors()(row, column) - from.vectors()(row, column)) >
+                SMALL_CHANGE * from.vectors()(row, row))
+                return false;
+    return true;
 }
 
 string readText(std::istream& stream, size_t limit) {
@@ -104,6 +143,8 @@ void refuseNotFinite(const CheckedQuantity& quantity, int particle, const Vec3& 
 void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegrator& integrator,
                                    const Scene& sceneSeen) {
     scene = sceneSeen;
+    settings = &integrator;
+    engineBox.reset();
     masses.clear();
     for (int i = 0; i < context.getSystem().getNumParticles(); i++)
         masses.push_back(context.getSystem().getParticleMass(i));
@@ -130,14 +171,15 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
     overrides.windowSupport = wish.windowSupport;
     overrides.windowShape = wish.windowShape;
     overrides.lanczosTolerance = wish.lanczosTolerance;
-    request.reset(new PlanRequest{currentBox(), static_cast<int>(scene.mobile.size()),
-                                  scene.radii[0], integrator.getErrorTolerance(),
-                                  integrator.getTemperature() > 0, 0, false, overrides,
-                                  choiceOf(integrator.getSplit())});
+    const Lattice box = currentBox();
+    request.reset(new PlanRequest{box, static_cast<int>(scene.mobile.size()), scene.radii[0],
+                                  integrator.getErrorTolerance(), integrator.getTemperature() > 0,
+                                  0, false, overrides, choiceOf(integrator.getSplit())});
     if (isMixture(scene.radii))
         request->radii = scene.radii;
     adapt(*request);
-    plan(request->box);
+    const std::optional<Prepared> moving = prepareFor(box);
+    use(moving ? *moving : prepared(*request), box);
 }
 
 void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
@@ -175,21 +217,57 @@ Lattice PlannedStepKernel::currentBox() const {
     }
 }
 
-void PlannedStepKernel::plan(const Lattice& box) {
-    const Plan made = planFor(box);
-    useEngine(made, box);
-    currentPlan = made;
-    request->box = box;
+bool PlannedStepKernel::isSheared() const {
+    return scene.periodicBox && settings->getShearRate() != 0;
 }
 
-bool PlannedStepKernel::followBox() {
+double PlannedStepKernel::strainOf(double time, double dt) const {
+    return settings->getShearRate() == 0 ? 0 : flowOf(*settings).strain(time, dt);
+}
+
+std::optional<PlannedStepKernel::Prepared> PlannedStepKernel::prepareFor(const Lattice& box) const {
+    const bool sheared = isSheared();
+    const bool breathes = !scene.barostat.empty() ||
+                          (engineBox && box != *engineBox && isSmallChange(*engineBox, box));
+    const bool planned = request->moving || !(sheared || !scene.barostat.empty());
+    const Lattice needed = sheared ? box.mostSheared() : box;
+    if (planned && serves(*request, needed))
+        return std::nullopt;
+    PlanRequest next = *request;
+    next.moving = sheared;
+    next.box = needed;
+    next.shortest = 1;
+    if (breathes) {
+        PlanRequest wide = next;
+        wide.moving = true;
+        wide.box = needed.scaled(GROWTH);
+        wide.shortest = SHRINKAGE / GROWTH;
+        try {
+            return prepared(wide);
+        } catch (const OpenMMException&) {
+            // no room to move in: each box then has a Plan of its own
+        }
+    }
+    return prepared(next);
+}
+
+void PlannedStepKernel::use(const Prepared& next, const Lattice& box) {
+    useEngine(next.plan, box);
+    currentPlan = next.plan;
+    *request = next.request;
+    engineBox = box;
+}
+
+void PlannedStepKernel::followBox() {
     if (!request)
-        return false;
+        return;
     const Lattice box = currentBox();
-    if (box == request->box)
-        return false;
-    plan(box);
-    return true;
+    if (const std::optional<Prepared> next = prepareFor(box))
+        use(*next, box);
+    else if (box != *engineBox) {
+        setEngineBox(box);
+        engineBox = box;
+    }
 }
 
 double PlannedStepKernel::farthestPosition() const {
@@ -255,11 +333,9 @@ NumericalParameters PlannedStepKernel::getNumericalParameters() const {
     return parametersOf(currentPlan);
 }
 
-Plan PlannedStepKernel::planFor(const Lattice& box) const {
-    PlanRequest changed = *request;
-    changed.box = box;
+PlannedStepKernel::Prepared PlannedStepKernel::prepared(const PlanRequest& next) const {
     try {
-        return makePlan(changed);
+        return {next, makePlan(next)};
     } catch (const std::invalid_argument& refusal) {
         throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
     }
@@ -281,15 +357,75 @@ string PlannedStepKernel::signature(const Plan& plan) const {
     return text.str();
 }
 
+StepState PlannedStepKernel::getStepState() const {
+    StepState state;
+    state.step = steps;
+    state.sample = samples;
+    state.strain = strain;
+    if (!request)
+        return state;
+    // The box may have changed since the last step: what counts is what the next step will use.
+    const std::optional<Prepared> next = prepareFor(currentBox());
+    const PlanRequest& planned = next ? next->request : *request;
+    for (int d = 0; d < 3; d++)
+        for (int c = 0; c < 3; c++)
+            state.plannedBox[d][c] = planned.box.vectors()(c, d);
+    state.plannedToMove = planned.moving;
+    state.plannedShortest = planned.shortest;
+    return state;
+}
+
+PlanRequest PlannedStepKernel::requestOf(const StepState& state) const {
+    const auto damaged = [](const string& what) -> OpenMMException {
+        return OpenMMException("PSEBrownianIntegrator: the State or checkpoint holds " + what +
+                               "; it is damaged");
+    };
+    if (state.step >= LARGEST_COUNTER || state.sample >= LARGEST_COUNTER)
+        throw damaged("a noise counter of 2^48 or more");
+    if (!std::isfinite(state.strain))
+        throw damaged("a strain that is not finite");
+    if (!(state.plannedShortest > 0 && state.plannedShortest <= 1))
+        throw damaged("a planned box that shrinks by a factor of " +
+                      std::to_string(state.plannedShortest));
+    PlanRequest planned = *request;
+    planned.moving = state.plannedToMove;
+    planned.shortest = state.plannedShortest;
+    try {
+        planned.box = Lattice(fromOpenMM(state.plannedBox[0]), fromOpenMM(state.plannedBox[1]),
+                              fromOpenMM(state.plannedBox[2]));
+    } catch (const std::invalid_argument&) {
+        throw damaged("a planned box that is none");
+    }
+    return planned;
+}
+
+void PlannedStepKernel::setStepState(const StepState& state) {
+    if (request && state.plannedBox[0][0] != 0) {
+        const PlanRequest planned = requestOf(state);
+        const Lattice box = currentBox();
+        const Lattice needed = isSheared() ? box.mostSheared() : box;
+        const bool same = planned.box == request->box && planned.moving == request->moving &&
+                          planned.shortest == request->shortest;
+        if (!same && serves(planned, needed))
+            use(prepared(planned), box);
+    }
+    steps = state.step;
+    samples = state.sample;
+    strain = state.strain;
+}
+
 void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
+    const StepState state = getStepState();
     writeText(stream, CHECKPOINT_MAGIC);
-    // The box may have changed since the last step: what counts is the Plan that the next step will
-    // use.
-    const bool stale = request && currentBox() != request->box;
-    writeText(stream, signature(stale ? planFor(currentBox()) : currentPlan));
+    writeText(stream, signature(request ? prepared(requestOf(state)).plan : currentPlan));
     write(stream, seed);
-    write(stream, steps);
-    write(stream, samples);
+    write(stream, state.step);
+    write(stream, state.sample);
+    write(stream, state.strain);
+    for (const OmmVec3& edge : state.plannedBox)
+        write(stream, edge);
+    write(stream, state.plannedToMove);
+    write(stream, state.plannedShortest);
 }
 
 void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
@@ -300,9 +436,17 @@ void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
             "'); this version reads '" + CHECKPOINT_MAGIC + "'");
     const string theirs = readText(stream, 4096);
     const int theirSeed = read<int>(stream);
-    const uint64_t theirSteps = read<uint64_t>(stream), theirSamples = read<uint64_t>(stream);
-    followBox(); // the box came with the checkpoint, and with it the Plan to compare
-    const string ours = signature(currentPlan);
+    StepState state;
+    state.step = read<decltype(state.step)>(stream);
+    state.sample = read<decltype(state.sample)>(stream);
+    state.strain = read<double>(stream);
+    for (OmmVec3& edge : state.plannedBox)
+        edge = read<OmmVec3>(stream);
+    state.plannedToMove = read<bool>(stream);
+    state.plannedShortest = read<double>(stream);
+    // Only what the checkpoint was planned for makes a Plan that may be compared with its own.
+    const bool planned = request && state.plannedBox[0][0] != 0;
+    const string ours = signature(planned ? prepared(requestOf(state)).plan : currentPlan);
     if (theirs != ours)
         throw OpenMMException(
             "PSEBrownianIntegrator: the checkpoint was written with other numerical parameters (" +
@@ -310,22 +454,8 @@ void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
             "); create the Context with the same settings, or give them "
             "by setNumericalParameters. Positions, box and time of this Context are now the "
             "checkpoint's");
+    setStepState(state);
     seed = theirSeed;
-    steps = theirSteps;
-    samples = theirSamples;
-}
-
-void PlannedStepKernel::getCounters(unsigned long long& step, unsigned long long& sample) const {
-    step = steps;
-    sample = samples;
-}
-
-void PlannedStepKernel::setCounters(unsigned long long step, unsigned long long sample) {
-    if (step >= LARGEST_COUNTER || sample >= LARGEST_COUNTER)
-        throw OpenMMException("PSEBrownianIntegrator: the State holds a noise counter of 2^48 or "
-                              "more; it is damaged");
-    steps = step;
-    samples = sample;
 }
 
 } // namespace PSE

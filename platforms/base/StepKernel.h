@@ -11,6 +11,7 @@
 #include "numerics/UnboundedPlan.h"
 #include "openmmpse/PSEKernels.h"
 #include <memory>
+#include <optional>
 
 namespace PSE {
 
@@ -43,8 +44,9 @@ public:
     std::vector<StageTime> getStageTimes() const override { return clock.times(); }
     void createCheckpoint(std::ostream& stream) const override;
     void loadCheckpoint(std::istream& stream) override;
-    void getCounters(unsigned long long& step, unsigned long long& sample) const override;
-    void setCounters(unsigned long long step, unsigned long long sample) override;
+    StepState getStepState() const override;
+    double getStrain() const override { return strain; }
+    void setStepState(const StepState& state) override;
 
 protected:
     /** The box of the Context, now. */
@@ -60,6 +62,8 @@ protected:
     virtual void adapt(numerics::UnboundedRequest& request) const = 0;
     /** A fluid without a boundary, and without a box. */
     virtual void useUnbounded(const numerics::UnboundedPlan& plan) = 0;
+    /** The engine shall follow a box that moves, with the Plan it has. */
+    virtual void setEngineBox(const numerics::Lattice& box) = 0;
     /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
     virtual void useFreeDraining() = 0;
     /** Whether useEngine() can use a Plan for unequal radii. */
@@ -73,10 +77,15 @@ protected:
     virtual double coordinateRounding() const { return 1.1e-16; }
 
     /**
-     * Make Plan and engine anew if the box has changed; on failure the old ones stay.
-     * @return whether it had
+     * The engine follows the box of the Context: with the Plan it has, if that was made for a box
+     * that moves and still serves this one, else with a new Plan; on failure the old ones stay.
      */
-    bool followBox();
+    void followBox();
+    const numerics::Plan& plan() const { return currentPlan; }
+    /** The strain of a step from a time of the Context on (ps); 0 without shear. */
+    double strainOf(double time, double dt) const;
+    /** The box of the Context after a strain. */
+    numerics::Lattice shearedBox(double strain) const { return currentBox().sheared(strain); }
     /** The noise of the next step, or of the next sample. */
     Thermal thermal(const PSEBrownianIntegrator& integrator, bool sample) const;
     /**
@@ -93,11 +102,22 @@ protected:
     double viscosity = 0;
     StageClock clock;
     uint64_t steps = 0, samples = 0; ///< thermal steps taken, samples drawn
+    double strain = 0;               ///< so far
 
 private:
+    /** A Plan and what it was made for. */
+    struct Prepared {
+        numerics::PlanRequest request;
+        numerics::Plan plan;
+    };
     numerics::Lattice currentBox() const;
-    numerics::Plan planFor(const numerics::Lattice& box) const;
-    void plan(const numerics::Lattice& box);
+    bool isSheared() const;
+    /** What must be planned for before a step in that box; nothing if the present Plan serves. */
+    std::optional<Prepared> prepareFor(const numerics::Lattice& box) const;
+    Prepared prepared(const numerics::PlanRequest& request) const;
+    /** What the state was planned for. */
+    numerics::PlanRequest requestOf(const StepState& state) const;
+    void use(const Prepared& next, const numerics::Lattice& box);
     void planUnbounded(const PSEBrownianIntegrator& integrator);
     /** @throws OpenMMException naming two unequal radii, if the platform cannot do them */
     void requireServedRadii();
@@ -105,8 +125,11 @@ private:
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
     std::string signature(const numerics::Plan& plan) const;
 
-    /// NULL without hydrodynamics or mobile particles, and in an unbounded fluid
+    const PSEBrownianIntegrator* settings = NULL;
+    /// what the Plan was made for; NULL without hydrodynamics or mobile particles, and in an
+    /// unbounded fluid
     std::unique_ptr<numerics::PlanRequest> request;
+    std::optional<numerics::Lattice> engineBox;
     numerics::Plan currentPlan = {};
     std::unique_ptr<numerics::UnboundedPlan> unboundedPlan; ///< NULL in any other scene
     int seed = 0;

@@ -54,10 +54,17 @@ void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegra
                               std::to_string(device.getMaxThreadBlockSize()) + " threads, and " +
                               std::to_string(GROUP_SIZE) +
                               " are needed; use another device or the CPU platform");
+    if (integrator.getShearRate() != 0)
+        requireShear(context);
     tolerance = integrator.getErrorTolerance();
     device.initializeContexts();
     ContextSelector selector(device);
     PlannedStepKernel::initialize(context, integrator, sceneSeen);
+}
+
+void CommonStepKernel::requireShear(ContextImpl&) const {
+    throw OpenMMException("PSEBrownianIntegrator: setShearRate: this platform has no shear flow; "
+                          "use the platform CPU, or leave the shear rate at 0");
 }
 
 void CommonStepKernel::boxVectors(OmmVec3 box[3]) const {

@@ -23,6 +23,7 @@ public:
                     const Scene& scene) override;
     void positionsChanged() override { positionsChecked = false; }
     void checkPositions(OpenMM::ContextImpl& context) override;
+    void requireShear(OpenMM::ContextImpl& context) const override;
     void execute(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator) override;
     double computeKineticEnergy(OpenMM::ContextImpl& context) override;
     std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context,
@@ -37,6 +38,7 @@ protected:
     void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) override;
     void adapt(numerics::UnboundedRequest& request) const override;
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
+    void setEngineBox(const numerics::Lattice& box) override { useEngine(plan(), box); }
     void useFreeDraining() override;
     bool servesMixtures() const override { return true; }
     int lanczosIterations() const override { return engine->lanczosIterations(); }

@@ -32,6 +32,14 @@ CpuEngine<Real>::CpuEngine(const Plan& plan, const Lattice& box, double viscosit
       threads(pool, isSmall(plan, indices.size())), clock(clock), realSpace(plan, box, threads),
       waveSpace(plan, box, threads) {}
 
+template <class Real> void CpuEngine<Real>::setBox(const Lattice& moved) {
+    clock.start();
+    box = moved;
+    realSpace.setBox(moved);
+    waveSpace.setBox(moved);
+    clock.charge(MOVING_BOX);
+}
+
 template <class Real> void CpuEngine<Real>::setPositions(const std::vector<Vec3>& x) {
     clock.start();
     fractions.resize(x.size());

@@ -17,6 +17,7 @@ template <class Real> class CpuEngine : public MobilityEngine {
 public:
     CpuEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
               const std::vector<int>& indices, OpenMM::ThreadPool& pool, StageClock& clock);
+    void setBox(const numerics::Lattice& box) override;
     void setPositions(const std::vector<numerics::Vec3>& x) override;
     void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
                            std::vector<numerics::Vec3>& u) override;

@@ -56,14 +56,11 @@ template <class Real>
 CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Threads& threads)
     : KrylovVectors<Real>(threads), box(box), a(plan.a), range(plan.realCutoff),
       sumImages(plan.sumImages), candidateRoom(threads.count()) {
-    if (plan.mixture)
+    setBox(box);
+    if (plan.mixture) {
         mixture.reset(new CpuMixturePairs<Real>(plan, threads.count()));
-    const Matrix3& v = box.vectors();
-    tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
-    for (int d = 0; d < 3; d++)
-        width[d] = box.width(d);
-    if (mixture)
         return;
+    }
     const RealTable table = makeRealTable(*plan.split, range / a, plan.tableError);
     self = Real(table.self);
     coefficientsF = hornerOrder<Real>(table.F);
@@ -73,6 +70,14 @@ CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Thr
 template <class Real> double CpuRealSpace<Real>::bytesPerParticle(const Plan& plan) {
     return 0.5 * sizeof(PairBlock<Real>) + 10 * 3 * sizeof(Real) + 64 +
            (plan.mixture ? CpuMixturePairs<Real>::bytesPerParticle() : 0);
+}
+
+template <class Real> void CpuRealSpace<Real>::setBox(const Lattice& other) {
+    box = other;
+    const Matrix3& v = box.vectors();
+    tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
+    for (int d = 0; d < 3; d++)
+        width[d] = box.width(d);
 }
 
 template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {

@@ -30,6 +30,8 @@ public:
     static constexpr double BYTES_PER_PAIR = double(sizeof(PairBlock<Real>)) / PAIR_LANES;
     /** Per particle: half a block unused, ten vectors, places, and its radius in a mixture. */
     static double bytesPerParticle(const numerics::Plan& plan);
+    /** Another box with the same Plan; positions must be set anew. */
+    void setBox(const numerics::Lattice& box);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts: those of placeParticles(), then

@@ -24,7 +24,9 @@ int extentOf(double reach) {
 
 template <class Real> int CpuSphereSpread<Real>::paddingOf(const Plan& plan, const Lattice& box) {
     const double reach = windowOf(plan).reach(plan.mixture->radii().back());
-    return extentOf(reach * GridMetric(box, plan.grid, plan.a).pointsPerLength[2]) + SPHERE_LANES;
+    // the third width is c.z in every box: if the box moves, it can become this much shorter
+    const double points = GridMetric(box, plan.grid, plan.a).pointsPerLength[2] / plan.shortest;
+    return extentOf(reach * points) + SPHERE_LANES;
 }
 
 template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan& plan) {
@@ -37,8 +39,17 @@ template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan&
 
 template <class Real>
 CpuSphereSpread<Real>::CpuSphereSpread(const Plan& plan, const Lattice& box, const Threads& threads)
-    : Base(plan.grid, paddingOf(plan, box)) {
-    const GridMetric metric(box, plan.grid, plan.a);
+    : Base(plan.grid, paddingOf(plan, box)), a(plan.a) {
+    const std::vector<double>& radii = plan.mixture->radii();
+    for (double radius : plan.mixture->particleRadii())
+        shapeOf.push_back(
+            static_cast<int>(std::lower_bound(radii.begin(), radii.end(), radius) - radii.begin()));
+    makeShapes(plan, threads);
+    setBox(box);
+}
+
+template <class Real> void CpuSphereSpread<Real>::setBox(const Lattice& box) {
+    const GridMetric metric(box, {size[0], size[1], size[2]}, a);
     for (int d = 0; d < 3; d++)
         pointsPerLength[d] = metric.pointsPerLength[d];
     plane = Real(metric.plane);
@@ -47,12 +58,12 @@ CpuSphereSpread<Real>::CpuSphereSpread(const Plan& plan, const Lattice& box, con
     skewY = Real(metric.skewY);
     skewX = Real(metric.skewX);
     skewZ = Real(metric.skewZ);
-
-    const std::vector<double>& radii = plan.mixture->radii();
-    for (double radius : plan.mixture->particleRadii())
-        shapeOf.push_back(
-            static_cast<int>(std::lower_bound(radii.begin(), radii.end(), radius) - radii.begin()));
-    makeShapes(plan, threads);
+    widest = 0;
+    for (size_t i = 0; i < shapes.size(); i++) {
+        for (int d = 0; d < 3; d++)
+            shapes[i].extent[d] = extentOf(reach[i] * pointsPerLength[d]);
+        widest = std::max(widest, shapes[i].extent[0]);
+    }
 }
 
 template <class Real>
@@ -73,9 +84,6 @@ void CpuSphereSpread<Real>::makeShapes(const Plan& plan, const Threads& threads)
         const Real least = kernel.inner > 0 ? Real(-1) : Real(-2);
         SphereShape<Real> shape = {Real(kernel.scale), Real(kernel.shift), least, {}};
         reach.push_back(kernel.reach);
-        for (int d = 0; d < 3; d++)
-            shape.extent[d] = extentOf(kernel.reach * pointsPerLength[d]);
-        widest = std::max(widest, shape.extent[0]);
         shapes.push_back(shape);
         const std::vector<double>& powers = kernel.polynomial.powers;
         for (size_t p = 0; p < powers.size(); p++)

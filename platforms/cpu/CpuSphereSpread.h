@@ -20,6 +20,7 @@ public:
                     const Threads& threads);
     static int paddingOf(const numerics::Plan& plan, const numerics::Lattice& box);
     static double bytesPerParticle(const numerics::Plan& plan);
+    void setBox(const numerics::Lattice& box) override;
     void begin(int particles) override;
     void assign(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
     void place(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
@@ -36,6 +37,7 @@ private:
     GridSpheres<Real> spheres() const;
     double lowest(int shape, int d, double u) const;
 
+    double a; ///< unit of lengths (nm)
     SphereKernels<Real> loops = sphereKernels<Real>();
     double pointsPerLength[3]; ///< how many grid points a sphere of radius 1 reaches to
     int degree = 0, widest = 0;

@@ -3,6 +3,7 @@
 #define OPENMMPSE_CPUSPREAD_H_
 
 #include "Threads.h"
+#include "numerics/Lattice.h"
 #include "numerics/Vec3.h"
 #include <algorithm>
 #include <array>
@@ -29,6 +30,8 @@ public:
         rowLength = row;
         planeLength = plane;
     }
+    /** Another box, of a Plan made for one that moves. */
+    virtual void setBox(const numerics::Lattice&) {}
     // The parts of placeParticles():
     virtual void begin(int particles);
     virtual void assign(const std::vector<numerics::Vec3>& fractions, int from, int to) = 0;

@@ -55,6 +55,7 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
         std::fill(grid.begin(), grid.begin() + size[0] * planeLength, Real(0));
     }
     factors.resize(factorRow(size[1], 0, 0));
+    keptChunks.assign(size[1], 0);
     const size_t room = std::max(4 * planeLength, size_t(3 * 2) * size[0] * WAVE_LANES);
     for (int i = 0; i < threads.count(); i++) {
         scratch.emplace_back(new FftArray<Real>(room));
@@ -62,7 +63,10 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     }
     fft.reset(new GridFft<Real>({{size[0], size[1], size[2]}, rowLength, planeLength, WAVE_LANES}));
 
-    prepareFactors(WaveFactors(plan, box));
+    if (plan.moving)
+        prepareMovingFactors(plan);
+    else
+        prepareFactors(WaveFactors(plan, box));
 }
 
 template <class Real> double CpuWaveSpace<Real>::bytesPerParticle(const Plan& plan) {
@@ -81,7 +85,6 @@ double CpuWaveSpace<Real>::bytesPerGridPoint(const Plan& plan, const Lattice& bo
 }
 
 template <class Real> void CpuWaveSpace<Real>::prepareFactors(const WaveFactors& waves) {
-    keptChunks.assign(size[1], 0);
     threads.run(size[1], [&](int y, int) {
         for (int x = 0; x < size[0]; x++)
             for (int z = 0; z < chunks * WAVE_LANES; z++) {
@@ -91,6 +94,52 @@ template <class Real> void CpuWaveSpace<Real>::prepareFactors(const WaveFactors&
                 if (factor > 0)
                     keptChunks[y] = std::max(keptChunks[y], chunk + 1);
             }
+    });
+}
+
+template <class Real> void CpuWaveSpace<Real>::prepareMovingFactors(const Plan& plan) {
+    moving.reset(new MovingWaveFactors(plan));
+    const std::vector<double>& powers = moving->weight.w.powers;
+    weightCoefficients.assign(powers.rbegin(), powers.rend());
+    for (int d = 0; d < 3; d++) {
+        const std::vector<double>& exact = moving->deconvolution[d];
+        deconvolution[d].assign(d < 2 ? size[d] : chunks * WAVE_LANES, Real(0));
+        for (size_t i = 0; i < exact.size(); i++)
+            deconvolution[d][i] = Real(exact[i]);
+    }
+    setBox(box);
+}
+
+/** What all columns of modes share. */
+template <class Real> FactorColumns<Real> CpuWaveSpace<Real>::factorColumns() const {
+    FactorColumns<Real> columns = {};
+    columns.sizeX = size[0];
+    const Matrix3 waves = a * box.waveVectors();
+    for (int i = 0; i < 9; i++)
+        columns.waveVectors[i] = Real(waves(i / 3, i % 3));
+    columns.inverseX = deconvolution[0].data();
+    columns.last2 = Real(moving->weight.end2);
+    columns.degree = int(weightCoefficients.size()) - 1;
+    columns.coefficients = weightCoefficients.data();
+    return columns;
+}
+
+template <class Real> void CpuWaveSpace<Real>::setBox(const Lattice& other) {
+    box = other;
+    spreading->setBox(box);
+    const FactorColumns<Real> shared = factorColumns();
+    const double scale = moving->scale(box);
+    threads.run(size[1], [&](int y, int) {
+        FactorColumns<Real> columns = shared;
+        columns.ny = waveIndex(1, y);
+        columns.inverseY = Real(scale) * deconvolution[1][y];
+        keptChunks[y] = 0;
+        for (int chunk = 0; chunk < chunks; chunk++) {
+            columns.firstZ = chunk * WAVE_LANES;
+            columns.inverseZ = deconvolution[2].data() + columns.firstZ;
+            if (waveLoops.fillFactors(columns, factors.begin() + factorRow(y, chunk, 0)))
+                keptChunks[y] = chunk + 1;
+        }
     });
 }
 

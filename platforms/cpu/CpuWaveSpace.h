@@ -27,6 +27,8 @@ public:
     static double bytesPerGridPoint(const numerics::Plan& plan, const numerics::Lattice& box);
     /** Bytes per particle. */
     static double bytesPerParticle(const numerics::Plan& plan);
+    /** Another box with the same Plan, which was made for one that moves [T36]. */
+    void setBox(const numerics::Lattice& box);
     /** @param fractions  coordinates along the box vectors, in [0, 1) */
     void setPositions(const std::vector<numerics::Vec3>& fractions);
     // The same in parts, those of placeParticles():
@@ -53,6 +55,8 @@ public:
 private:
     using Complex = std::complex<Real>;
     void prepareFactors(const numerics::WaveFactors& waves);
+    void prepareMovingFactors(const numerics::Plan& plan);
+    FactorColumns<Real> factorColumns() const;
     size_t factorRow(int y, int chunk, int x) const {
         return ((size_t(y) * chunks + chunk) * size[0] + x) * WAVE_LANES;
     }
@@ -75,6 +79,9 @@ private:
     FftArray<Real> grids[3];     ///< [x][y][z], real or complex
     FftArray<Real> factors;      ///< [y][chunk][x][WAVE_LANES]
     std::vector<int> keptChunks; ///< per y: beyond, no mode is kept
+    /// of a box that moves, else NULL; its weight in powers, highest first, and its deconvolution
+    std::unique_ptr<numerics::MovingWaveFactors> moving;
+    std::vector<Real> weightCoefficients, deconvolution[3];
     /// per thread: four planes, or three blocks of columns
     std::vector<std::unique_ptr<FftArray<Real>>> scratch;
 };

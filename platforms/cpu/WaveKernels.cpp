@@ -176,6 +176,40 @@ template <class Real> HWY_INLINE bool anyKept(const Real* factors) {
 }
 
 template <class Real>
+bool fillFactorsAny(const FactorColumns<Real>& columns, Real* HWY_RESTRICT factors) {
+    const hn::CappedTag<Real, LANES> d;
+    const Real* b = columns.waveVectors;
+    const auto zero = hn::Zero(d), one = hn::Set(d, Real(1)), last2 = hn::Set(d, columns.last2),
+               scale = hn::Set(d, 2 / columns.last2);
+    auto largest = zero;
+    for (int x = 0; x < columns.sizeX; x++) {
+        const int nx = (2 * x <= columns.sizeX ? x : x - columns.sizeX);
+        const auto along = hn::Set(d, columns.inverseX[x] * columns.inverseY);
+        for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
+            const auto nz = hn::Iota(d, Real(columns.firstZ + int(i)));
+            auto k2 = zero;
+            for (int c = 0; c < 3; c++) {
+                const auto k = hn::MulAdd(hn::Set(d, b[3 * c + 2]), nz,
+                                          hn::Set(d, b[3 * c] * nx + b[3 * c + 1] * columns.ny));
+                k2 = hn::MulAdd(k, k, k2);
+            }
+            const auto t = hn::MulSub(scale, k2, one);
+            auto w = hn::Set(d, columns.coefficients[0]);
+            for (int power = 1; power <= columns.degree; power++)
+                w = hn::MulAdd(w, t, hn::Set(d, columns.coefficients[power]));
+            const auto kept = hn::And(hn::Gt(k2, zero), hn::Lt(k2, last2));
+            const auto D = hn::IfThenElseZero(
+                kept, hn::Div(hn::Mul(hn::Mul(along, hn::LoadU(d, columns.inverseZ + i)),
+                                      hn::Max(w, zero)),
+                              k2));
+            hn::StoreU(D, d, factors + size_t(x) * LANES + i);
+            largest = hn::Max(largest, D);
+        }
+    }
+    return !hn::AllTrue(d, hn::Eq(largest, zero));
+}
+
+template <class Real>
 void scaleColumnsAny(const WaveColumns<Real>& columns, std::complex<Real>* const blocks[3]) {
     Real noise[6][LANES];
     for (int x = 0; x < columns.sizeX; x++) {
@@ -217,10 +251,10 @@ void particleNoiseAny(const numerics::NoiseKey& key, const uint32_t* HWY_RESTRIC
 
 // Dispatch tables hold functions, not templates: one name per precision.
 WaveKernels<float> singleWaveKernels() {
-    return {scaleColumnsAny<float>, particleNoiseAny<float>};
+    return {fillFactorsAny<float>, scaleColumnsAny<float>, particleNoiseAny<float>};
 }
 WaveKernels<double> doubleWaveKernels() {
-    return {scaleColumnsAny<double>, particleNoiseAny<double>};
+    return {fillFactorsAny<double>, scaleColumnsAny<double>, particleNoiseAny<double>};
 }
 
 } // namespace HWY_NAMESPACE

@@ -26,7 +26,21 @@ template <class Real> struct WaveColumns {
     numerics::NoiseKey key;
 };
 
+/** The factors of WAVE_LANES columns of modes at fixed y, for a box that moves [T36]. */
+template <class Real> struct FactorColumns {
+    int sizeX, ny, firstZ;    ///< as in WaveColumns
+    Real waveVectors[9];      ///< as in WaveColumns
+    const Real* inverseX;     ///< [M_x] 1/window^2, 0 for dropped modes
+    Real inverseY;            ///< the same, times what all factors have in common
+    const Real* inverseZ;     ///< [WAVE_LANES], from firstZ on
+    Real last2;               ///< k^2 beyond which w is 0
+    int degree;               ///< of w in t = 2 k^2/last2 - 1
+    const Real* coefficients; ///< [degree + 1], highest power first
+};
+
 template <class Real> struct WaveKernels {
+    /** WaveColumns::factors. @return whether any is not zero */
+    bool (*fillFactors)(const FactorColumns<Real>& columns, Real* factors);
     /**
      * u = (I - kk)(D f + noise sqrt(D) z) in place of f, for three blocks [x][WAVE_LANES] of
      * complex numbers; without forces their contents do not matter.

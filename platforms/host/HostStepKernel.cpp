@@ -89,13 +89,20 @@ void HostStepKernel::checkPositions(ContextImpl&) {
         for (int d = 0; d < 3; d++)
             fine &= std::fabs(x[d]) <= farthest; // false for what is not a number
     }
-    if (fine)
+    if (fine) {
+        factory->followBox(*data.positions, data.periodicBoxVectors);
         return;
+    }
     gather(*data.positions, positions);
     requireFinite(positions, POSITION);
     for (size_t i = 0; i < positions.size(); i++)
         if (positions[i].cwiseAbs().maxCoeff() > farthest)
             refuseFarAway(scene.mobile[i], positions[i]);
+}
+
+void HostStepKernel::addFlow(double strain, double dt) {
+    for (size_t i = 0; i < velocities.size(); i++)
+        velocities[i][0] += strain / dt * positions[i][1];
 }
 
 void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& integrator) {
@@ -106,15 +113,25 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
     engine->computeVelocities(&forces, noise.kT > 0 ? &noise : NULL, velocities);
     requireFinite(velocities, VELOCITY);
 
-    const double dt = integrator.getStepSize();
+    const double dt = integrator.getStepSize(), flow = strainOf(data.time, dt);
+    if (flow != 0)
+        addFlow(flow, dt);
     for (size_t i = 0; i < velocities.size(); i++)
         positions[i] += dt * velocities[i];
     requireFinite(positions, NEXT_POSITION);
+    if (flow != 0 && scene.periodicBox) {
+        const Matrix3 box = shearedBox(flow).vectors();
+        context.setPeriodicBoxVectors(toOpenMM(box.col(0)), toOpenMM(box.col(1)),
+                                      toOpenMM(box.col(2)));
+    }
     for (size_t i = 0; i < positions.size(); i++) {
         (*data.positions)[scene.mobile[i]] = toOpenMM(positions[i]);
         (*data.velocities)[scene.mobile[i]] = toOpenMM(velocities[i]);
     }
     context.computeVirtualSites();
+    if (flow != 0)
+        factory->followBox(*data.positions, data.periodicBoxVectors);
+    strain += flow;
     data.time += dt;
     data.stepCount++;
     steps++;

@@ -31,6 +31,7 @@ protected:
     void useEngine(const numerics::Plan& plan, const numerics::Lattice& box) override;
     void adapt(numerics::UnboundedRequest& request) const override { factory->adapt(request); }
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
+    void setEngineBox(const numerics::Lattice& box) override { engine->setBox(box); }
     void useFreeDraining() override;
     bool servesMixtures() const override { return factory->servesMixtures(); }
     int lanczosIterations() const override { return engine->lanczosIterations(); }
@@ -40,6 +41,8 @@ protected:
 private:
     /** Follow the box of the Context, and give the engine the current positions. */
     void followPositions();
+    /** Add the flow of a strain to the step that positions and velocities are about to make. */
+    void addFlow(double strain, double dt);
     /** @throws OpenMMException naming the first particle whose entry is not finite */
     void requireFinite(const std::vector<numerics::Vec3>& values,
                        const CheckedQuantity& quantity) const;

@@ -6,6 +6,7 @@
 #include "Thermal.h"
 #include "numerics/Plan.h"
 #include "numerics/UnboundedPlan.h"
+#include "openmm/Vec3.h"
 #include <memory>
 #include <vector>
 
@@ -18,6 +19,11 @@ namespace PSE {
 class MobilityEngine {
 public:
     virtual ~MobilityEngine() = default;
+    /**
+     * Follow a box that moves, with a Plan made for it: no memory is asked for. The positions must
+     * be set anew.
+     */
+    virtual void setBox(const numerics::Lattice&) {}
     /** Positions need not lie in the primary box. */
     virtual void setPositions(const std::vector<numerics::Vec3>& x) = 0;
     /**
@@ -39,6 +45,11 @@ public:
     virtual bool servesMixtures() const { return false; }
     /** Fill in what the platform knows of the request: its precision and its costs. */
     virtual void adapt(numerics::PlanRequest& request) const = 0;
+    /**
+     * What OpenMM keeps for its Forces on this platform shall fit these positions in this box; to
+     * be called before forces are computed, and after the box has been changed.
+     */
+    virtual void followBox(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*) {}
     /**
      * @param indices  particle index in the System of each mobile particle: noise belongs to the
      * particle

@@ -31,7 +31,15 @@ void ReferenceEngine::prepareRealHalf() {
         realSelf.push_back(mixtureTable->self(a));
 }
 
+void ReferenceEngine::setBox(const Lattice& moved) {
+    clock.start();
+    box = moved;
+    listModes();
+    clock.charge(MOVING_BOX);
+}
+
 void ReferenceEngine::listModes() {
+    modes.clear();
     const Matrix3 waves = box.waveVectors();
     // Nyquist planes are dropped
     const int limit[3] = {(plan.grid[0] - 1) / 2, (plan.grid[1] - 1) / 2, (plan.grid[2] - 1) / 2};

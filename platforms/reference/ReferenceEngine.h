@@ -19,6 +19,7 @@ public:
 
     ReferenceEngine(const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
                     const std::vector<int>& indices, StageClock& clock);
+    void setBox(const numerics::Lattice& box) override;
     void setPositions(const std::vector<numerics::Vec3>& x) override;
     void computeVelocities(const std::vector<numerics::Vec3>* forces, const Thermal* thermal,
                            std::vector<numerics::Vec3>& u) override;

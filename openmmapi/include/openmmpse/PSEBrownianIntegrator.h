@@ -88,6 +88,12 @@ public:
         Prolate = 1,
         Hasimoto = 2 ///< the published one, for every box
     };
+    /** How the shear rate depends on the time t of the Context. */
+    enum ShearProtocol : int {
+        SteadyShear = 0,      ///< the shear rate, at all times
+        OscillatoryShear = 1, ///< shear rate times cos(2 pi t/period)
+        StartUpShear = 2      ///< 0 before a starting time, the shear rate from then on
+    };
     /**
      * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without
      * noise
@@ -150,10 +156,24 @@ public:
     /** Get the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). */
     double getShearRate() const { return shearRate; }
     /**
-     * Set the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps). Takes effect at the next
-     * step.
+     * Set the shear rate of the undisturbed flow (rate*y, 0, 0) (in 1/ps), with y the coordinate of
+     * a particle as the Context reports it, not wrapped into the box. The box tilts with the flow,
+     * b.x and c.x growing by the strain times b.y and c.y, and is brought back to OpenMM's reduced
+     * form when the tilt passes one half: the images stay where they were. Takes effect at the next
+     * step. On OpenCL and CUDA the System's default box must be tilted.
      */
     void setShearRate(double rate);
+    /** Get how the shear rate depends on time. */
+    ShearProtocol getShearProtocol() const { return shearProtocol; }
+    /** Get the time of the shear protocol (in ps). */
+    double getShearTime() const { return shearTime; }
+    /**
+     * Set how the shear rate depends on the time of the Context; default SteadyShear. A step takes
+     * the exact integral of the rate over its length. Takes effect at the next step.
+     * @param time  the period of OscillatoryShear (in ps), > 0; the start of StartUpShear (in ps);
+     * not used by SteadyShear
+     */
+    void setShearProtocol(ShearProtocol protocol, double time = 0);
     /** Get the requested split. */
     Split getSplit() const { return split; }
     /**
@@ -217,6 +237,11 @@ public:
      * @return count*N displacements, sample by sample (in nm)
      */
     std::vector<OpenMM::Vec3> sampleBrownianDisplacements(int count);
+    /**
+     * Get the strain of all sheared steps so far: the integral of the shear rate over time. It is
+     * part of checkpoints and of States with integrator parameters.
+     */
+    double getStrain() const;
     /** Get the numerical parameters that the Context really uses, and the error they predict. */
     NumericalParameters getNumericalParameters() const;
     /**
@@ -247,6 +272,8 @@ private:
     MobilityModel mobilityModel = RotnePragerYamakawa;
     FluidBoundary fluidBoundary = Automatic;
     Split split = AutomaticSplit;
+    ShearProtocol shearProtocol = SteadyShear;
+    double shearTime = 0;
     int randomSeed = 0;
     std::map<int, double> particleRadii;
     NumericalParameters requested;

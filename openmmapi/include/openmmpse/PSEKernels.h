@@ -11,6 +11,17 @@
 
 namespace PSE {
 
+/** What the next step depends on, besides positions, box, time, seed and settings. */
+struct StepState {
+    unsigned long long step = 0, sample = 0; ///< thermal steps taken, samples drawn
+    double strain = 0;                       ///< of all sheared steps so far
+    /// What the Plan was made for: a box (zero vectors: no Plan), whether it moves, and how much
+    /// shorter it may become, as a factor
+    OpenMM::Vec3 plannedBox[3];
+    bool plannedToMove = false;
+    double plannedShortest = 1;
+};
+
 /** What a platform must be able to do for PSEBrownianIntegrator. */
 class IntegratePSEStepKernel : public OpenMM::KernelImpl {
 public:
@@ -50,12 +61,16 @@ public:
     virtual std::vector<StageTime> getStageTimes() const = 0;
     virtual void createCheckpoint(std::ostream& stream) const = 0;
     virtual void loadCheckpoint(std::istream& stream) = 0;
+    virtual StepState getStepState() const = 0;
+    /** StepState::strain alone. */
+    virtual double getStrain() const = 0;
+    /** Go on from there; the box of the Context is already the one that belongs to it. */
+    virtual void setStepState(const StepState& state) = 0;
     /**
-     * Thermal steps taken and samples drawn so far: with the seed, all the state there is besides
-     * the positions.
+     * @throws OpenMMException naming what keeps this platform from shearing this Context, and the
+     * remedy
      */
-    virtual void getCounters(unsigned long long& step, unsigned long long& sample) const = 0;
-    virtual void setCounters(unsigned long long step, unsigned long long sample) = 0;
+    virtual void requireShear(OpenMM::ContextImpl&) const {}
 };
 
 } // namespace PSE

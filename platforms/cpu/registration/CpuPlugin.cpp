@@ -4,6 +4,7 @@
 #include "CpuUnbounded.h"
 #include "HostStepKernel.h"
 #include "Memory.h"
+#include "NeighbourListKeeper.h"
 #include "openmm/KernelFactory.h"
 #include "openmm/cpu/CpuPlatform.h"
 #include "openmm/internal/ContextImpl.h"
@@ -20,8 +21,11 @@ constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
 
 class CpuEngineFactory : public EngineFactory {
 public:
-    explicit CpuEngineFactory(ThreadPool& pool) : pool(pool) {}
     bool servesMixtures() const override { return true; }
+    explicit CpuEngineFactory(CpuPlatform::PlatformData& data) : pool(data.threads), lists(data) {}
+    void followBox(const std::vector<Vec3>& positions, const Vec3* box) override {
+        lists.follow(positions, box);
+    }
     void adapt(numerics::PlanRequest& request) const override {
         request.singleFloor = SINGLE_PRECISION_FLOOR;
         request.directSums = false;
@@ -69,6 +73,7 @@ private:
             new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
     }
     ThreadPool& pool;
+    NeighbourListKeeper lists;
 };
 
 class CpuKernelFactory : public KernelFactory {
@@ -76,9 +81,9 @@ public:
     KernelImpl* createKernelImpl(std::string name, const Platform& platform,
                                  ContextImpl& context) const override {
         auto& data = *static_cast<ReferencePlatform::PlatformData*>(context.getPlatformData());
-        ThreadPool& pool = CpuPlatform::getPlatformData(context).threads;
+        auto& cpuData = CpuPlatform::getPlatformData(context);
         return new HostStepKernel(name, platform, data,
-                                  std::unique_ptr<EngineFactory>(new CpuEngineFactory(pool)));
+                                  std::unique_ptr<EngineFactory>(new CpuEngineFactory(cpuData)));
     }
 };
 

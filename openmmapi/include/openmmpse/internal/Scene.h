@@ -19,6 +19,9 @@ struct OPENMM_EXPORT_PSE Scene {
     int numMassless = 0;        ///< particles that do not move and are transparent to the fluid
     bool hydrodynamics = false; ///< particles feel each other through the fluid
     bool unbounded = false; ///< that fluid is infinite, and the box of the Context plays no part
+    /// Forces or fluid see images of the particles: shear tilts the box
+    bool periodicBox = false;
+    std::string barostat; ///< the kind of Force that moves the box; empty: none
     std::string modelReason, boundaryReason;
 };
 
@@ -35,10 +38,13 @@ struct OPENMM_EXPORT_PSE StageTime {
 OPENMM_EXPORT_PSE Scene makeScene(const OpenMM::System& system,
                                   const PSEBrownianIntegrator& integrator);
 
+/** @throws OpenMMException if something in the scene keeps its box from being sheared */
+void requireShear(const Scene& scene);
+
 /** The text of PSEBrownianIntegrator::describe(). */
 std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integrator,
                           const NumericalParameters& parameters,
-                          const std::vector<StageTime>& stages);
+                          const std::vector<StageTime>& stages, double strain);
 
 } // namespace PSE
 

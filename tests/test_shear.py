@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: MIT
+"""
+Shear flow [T35], [T36], [T38]: the flow, the box that tilts with it, and what must not notice it.
+Boxes begin with a small tilt, because OpenMM's devices tilt no box that was made rectangular.
+"""
+import copy
+
+import numpy as np
+import openmm
+import pytest
+from scipy import stats
+
+import scenes
+from openmmpse import PSEBrownianIntegrator
+from platformnames import contextOn, isDevice
+from scenes import FALSE_ALARM, KB, Scene, errorRatio, makeContext, positionsOf, randomForces
+from test_bad_input import assertMentions, messageOf
+
+STEADY, OSCILLATORY, STARTUP = (PSEBrownianIntegrator.SteadyShear,
+                                PSEBrownianIntegrator.OscillatoryShear,
+                                PSEBrownianIntegrator.StartUpShear)
+T, DT = 300.0, 1.0
+
+
+def barelyTilted(box):
+    box = np.array(box)
+    box[1, 0] += 1e-3*box[0, 0]
+    return box
+
+
+def suspension(seed=3, N=24, phi=0.1):
+    return scenes.randomSuspension(N, phi, barelyTilted(scenes.cube(1.0)), 0.5, seed)
+
+
+def shear(rate, protocol=STEADY, time=0.0, more=None):
+    def configure(i):
+        i.setShearRate(rate)
+        i.setShearProtocol(protocol, time)
+        if more is not None:
+            more(i)
+    return configure
+
+
+def freeDraining(i):
+    i.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
+
+
+def boxOf(context):
+    return np.array(context.getState().getPeriodicBoxVectors()._value)
+
+
+def rounding(platformName):
+    """Of positions of some ten nanometres."""
+    return 1e-5 if "single" in platformName else 1e-9 if isDevice(platformName) else 1e-11
+
+
+def repulsion(scene):
+    force = openmm.CustomNonbondedForce("200*step(s-r)*(s-r)^2; s=1.05")
+    force.setNonbondedMethod(openmm.CustomNonbondedForce.CutoffPeriodic)
+    force.setCutoffDistance(1.1)
+    for _ in range(scene.count):
+        force.addParticle([])
+    return force
+
+
+def run(context, integrator, steps):
+    path = []
+    for _ in range(steps):
+        integrator.step(1)
+        path.append(positionsOf(context))
+    return np.array(path)
+
+
+# ---------------------------------------------------------------- the flow
+
+@pytest.mark.parametrize("model", ["fluid", "free draining"])
+@pytest.mark.parametrize("protocol, time, strain", [
+    (STEADY, 0.0, lambda t: 0.037*t),
+    (OSCILLATORY, 31.0, lambda t: 0.037*31/(2*np.pi)*np.sin(2*np.pi*t/31)),
+    (STARTUP, 7.25, lambda t: 0.037*max(0.0, t - 7.25))])
+def testFreeParticlesFollowTheFlow(platformName, model, protocol, time, strain):
+    """x = x0 + strain y0, exactly, whatever the tilt and its flips; velocities are displacements."""
+    s = Scene(np.array([[1.0, 2.0, 3.0], [4.0, 6.5, 5.0], [0.5, -3.0, 1.0]]),
+              barelyTilted(np.diag([6.0, 7.0, 8.0])), 0.5)
+    context, integrator = makeContext(
+        s, platformName, 0.0, DT, forces=[scenes.periodicDummyForce(3, s.box)],
+        configure=shear(0.037, protocol, time, freeDraining if model != "fluid" else None))
+    for t in range(1, 61):
+        before = positionsOf(context)
+        integrator.step(1)
+        x = positionsOf(context)
+        expected = s.positions + strain(t)*s.positions[:, 1:2]*np.array([1, 0, 0])
+        assert abs(x - expected).max() <= rounding(platformName)*max(1, t/10)
+        assert np.allclose(scenes.velocitiesOf(context), (x - before)/DT, rtol=0,
+                           atol=10*rounding(platformName))
+        assert integrator.getStrain() == pytest.approx(strain(t), rel=1e-12, abs=1e-14)
+        tilt = 1e-3*6 + strain(t)*7
+        box = boxOf(context)
+        assert abs(box[1, 0]) <= 3.0
+        assert box[1, 0] == pytest.approx(tilt - 6*np.rint((tilt - box[1, 0])/6), abs=1e-6)
+        assert np.allclose(np.diag(box), [6, 7, 8], rtol=1e-6) and box[2, 0] == box[2, 1] == 0
+
+
+def testEveryVectorWithAYComponentTilts(platformName):
+    """c tilts by its own y component; images keep their distances through every flip."""
+    box = np.array([[6.0, 0, 0], [0.5, 7, 0], [-2.0, 3.0, 8]])
+    s = Scene(np.array([[1.0, 1.0, 1.0], [3.0, 5.0, 6.0]]), box, 0.5)
+    context, integrator = makeContext(s, platformName, configure=shear(0.05))
+    for step in range(1, 61):
+        integrator.step(1)
+        flow = np.array([[1, 0, 0], [0.05*step, 1, 0], [0, 0, 1]])
+        now = boxOf(context)
+        # the same lattice: one basis in terms of the other is an integer matrix of determinant 1
+        change = now @ np.linalg.inv(box @ flow)
+        assert np.allclose(change, np.rint(change), atol=1e-5)
+        assert round(np.linalg.det(np.rint(change))) == 1
+        assert 2*abs(now[1, 0]) <= 6 and 2*abs(now[2, 0]) <= 6
+        x = positionsOf(context)
+        wanted = (s.positions[0] - s.positions[1]) @ flow
+        assert np.allclose(x[0] - x[1], wanted, atol=10*rounding(platformName))
+
+
+@pytest.mark.hostOnly
+def testALatticeUnderShearIsPeriodic(platformName):
+    """
+    A falling simple cubic lattice under shear: after each unit of strain the same lattice, so each
+    period has the same displacements, 100 flips in a row.
+    """
+    side, L, perStrain, periods = 2, 4.0, 16, 100
+    places = np.stack(np.meshgrid(*[np.arange(side)]*3, indexing="ij"), -1).reshape(-1, 3)
+    s = Scene((places + 0.25)*L/side, scenes.cube(L), 0.5)
+    pull = scenes.constantForces(np.tile([30.0, -50.0, 0.0], (s.count, 1)))
+    # the lattice falls across the grid, whose error must not show
+    context, integrator = makeContext(s, platformName, stepSize=DT, tolerance=1e-7,
+                                      forces=[pull, repulsion(s)],
+                                      configure=shear(1.0/perStrain))
+    heights, relative = [positionsOf(context)[:, 1]], None
+    for period in range(periods):
+        integrator.step(perStrain)
+        x = positionsOf(context)
+        heights.append(x[:, 1])
+        lattice = (x - x[0]) - (period + 1)*(x - x[0])[:, 1:2]*np.array([1, 0, 0])
+        relative = lattice if relative is None else relative
+        assert abs(lattice - relative).max() < 1e-6
+    falls = np.diff(np.array(heights), axis=0)
+    assert falls.max() < -0.01
+    assert abs(falls - falls[0]).max() < 1e-6
+    assert integrator.getStrain() == pytest.approx(periods, rel=1e-12)
+    assert abs(boxOf(context)[1, 0]) < 1e-9
+
+
+# ---------------------------------------------------------------- the fluid in a tilting box
+
+def testVelocitiesAtEveryStrain(platformName):
+    """The error keeps the tolerance at any strain, with one Plan, made for the worst tilt."""
+    s = suspension()
+    tolerance = 1e-4 if "single" not in platformName else 1e-3
+    context, integrator = makeContext(s, platformName, tolerance=tolerance, configure=shear(0.13))
+    forces = randomForces(s)
+    plan = integrator.getNumericalParameters()
+    for _ in range(12):
+        integrator.step(1)
+        now = Scene(positionsOf(context), boxOf(context), s.radius)
+        error = errorRatio(integrator.applyMobility(forces), now.velocities(forces), forces, now)
+        assert error <= tolerance
+    assert integrator.getNumericalParameters() == plan
+    integrator.step(2)
+    assert "wave factors of the moving box" in integrator.describe()
+
+
+@pytest.mark.onePrecision
+def testTwoReducedFormsOfOneLattice(platformName):
+    """b and b - a at half tilt: one lattice, so the same velocities and the same law of noise."""
+    tolerance, count = 1e-4, 4000
+    s = scenes.randomSuspension(4, 0.04, scenes.cube(1.0), 0.5, 8)
+    L = s.box[0, 0]
+    boxes = [np.array([[L, 0, 0], [0.5*sign*L, L, 0], [0, 0, L]]) for sign in (1, -1)]
+    exact = Scene(s.positions, boxes[0], s.radius)
+    assert np.allclose(Scene(s.positions, boxes[1], s.radius).mobility, exact.mobility, atol=1e-12)
+    forces = randomForces(s)
+    for box in boxes:
+        context, integrator = makeContext(Scene(s.positions, box, s.radius), platformName, T, DT,
+                                          tolerance, configure=shear(0.01))
+        u = integrator.applyMobility(forces)
+        assert errorRatio(u, exact.velocities(forces), forces, exact) <= tolerance
+        samples = integrator.sampleBrownianDisplacements(count).reshape(count, -1)
+        scenes.assertUnitCovariance(
+            scenes.whiten(samples, 2*KB*T*DT*exact.mobility), "noise", tests=2)
+
+
+@pytest.mark.onePrecision
+@pytest.mark.withGrid
+def testErrorUnderShearIsThatOfTheOrthogonalBox(platformName):
+    """At fixed xi, grid and support, mean over 20 configurations, half tilt against none."""
+    errors = np.zeros((20, 2))
+    for seed in range(20):
+        s = scenes.randomSuspension(12, 0.1, scenes.cube(1.0), 0.5, 100 + seed)
+        start = Scene(s.positions, barelyTilted(s.box), s.radius)
+        still, planned = makeContext(start, platformName)
+        parameters = planned.getNumericalParameters()
+        context, integrator = makeContext(
+            start, platformName,
+            configure=shear(0.01, more=lambda i: i.setNumericalParameters(parameters)))
+        forces = randomForces(s, seed)
+        for column, tilt in enumerate((0.0, 0.5)):
+            box = np.array(s.box)
+            box[1, 0] = tilt*box[0, 0]
+            now = Scene(s.positions @ np.linalg.inv(s.box) @ box, box, s.radius)
+            context.setPeriodicBoxVectors(*box)
+            context.setPositions(now.positions)
+            errors[seed, column] = errorRatio(integrator.applyMobility(forces),
+                                              now.velocities(forces), forces, now)
+    orthogonal, sheared = errors.mean(axis=0)
+    assert sheared <= 1.2*orthogonal
+
+
+# ---------------------------------------------------------------- noise and shear
+
+@pytest.mark.onePrecision
+def testMeanSquareDisplacementInShear(platformName):
+    """
+    A free particle spreads along the flow as 2 D t (1 + (rate t)^2/3). The sum of n steps has the
+    variance 2 D t (1 + (rate dt)^2 (n - 1)(2n - 1)/6) exactly; with n steps it differs from that of
+    continuous time by a factor below 1 + 1.5/n. N independent Gaussians: chi-square, two-sided.
+    """
+    N, n, rate = 4000, 30, 0.1
+    s = Scene(np.zeros((N, 3)), barelyTilted(scenes.cube(10.0)), 0.5)
+    context, integrator = makeContext(s, platformName, T, DT, configure=shear(rate, more=freeDraining),
+                                      boundary=PSEBrownianIntegrator.Automatic, seed=17)
+    integrator.step(n)
+    x = positionsOf(context)
+    D = KB*T*s.mu0
+    along = 2*D*DT*n*(1 + (rate*DT)**2*(n - 1)*(2*n - 1)/6)
+    continuous = 2*D*DT*n*(1 + (rate*DT*n)**2/3)
+    assert abs(along/continuous - 1) < 1.5/n
+    for values, variance in ((x[:, 0], along), (x[:, 1], 2*D*DT*n), (x[:, 2], 2*D*DT*n)):
+        total = np.sum(values**2)/variance
+        assert stats.chi2.cdf(total, N) > FALSE_ALARM/6 and stats.chi2.sf(total, N) > FALSE_ALARM/6
+
+
+@pytest.mark.onePrecision
+def testWithoutARateNothingChanges(platformName):
+    """The protocol alone is no flow: trajectories agree to the bit with those without it."""
+    s = suspension()
+    paths = []
+    for configure in (None, shear(0.0, OSCILLATORY, 5.0)):
+        context, integrator = makeContext(s, platformName, T, DT, forces=[repulsion(s)],
+                                          configure=configure)
+        paths.append(run(context, integrator, 6))
+        assert integrator.getStrain() == 0 and np.array_equal(boxOf(context)[0], s.box[0])
+    assert np.array_equal(*paths)
+
+
+# ---------------------------------------------------------------- changes and restarts
+
+def testRateThatChangesWhileRunning(platformName):
+    """From zero to a rate, the Plan is made anew for the worst tilt; back to zero it stays."""
+    s = suspension()
+    context, integrator = makeContext(s, platformName)
+    still = integrator.getNumericalParameters()
+    integrator.step(2)
+    assert integrator.getNumericalParameters() == still
+    forces = randomForces(s)
+    strain = 0.0
+    for rate in (0.2, -0.35, 0.0, 0.3):
+        integrator.setShearRate(rate)
+        integrator.step(3)
+        strain += 3*rate
+        assert integrator.getStrain() == pytest.approx(strain, abs=1e-12)
+        now = Scene(positionsOf(context), boxOf(context), s.radius)
+        error = errorRatio(integrator.applyMobility(forces), now.velocities(forces), forces, now)
+        assert error <= 1e-3
+    context2, sheared = makeContext(s, platformName, configure=shear(0.3))
+    assert (sheared.getNumericalParameters()["gridDimensions"]
+            == integrator.getNumericalParameters()["gridDimensions"])
+
+
+@pytest.mark.parametrize("way", ["checkpoint", "state"])
+@pytest.mark.parametrize("protocol, time", [(STEADY, 0.0), (OSCILLATORY, 9.0)])
+def testRestartUnderShear(platformName, way, protocol, time):
+    """To the bit, past flips, with the strain so far."""
+    s = suspension()
+
+    def make(seed=41):
+        return makeContext(s, platformName, T, DT, forces=[repulsion(s)], seed=seed,
+                           configure=shear(0.17, protocol, time))
+    context, integrator = make()
+    integrator.step(5)
+    if way == "checkpoint":
+        saved = context.createCheckpoint()
+    else:
+        state = context.getState(positions=True, velocities=True, parameters=True,
+                                 integratorParameters=True)
+        saved = openmm.XmlSerializer.serialize(state)
+    expected, box, strain = run(context, integrator, 5), boxOf(context), integrator.getStrain()
+    other, fresh = make()
+    if way == "checkpoint":
+        other.loadCheckpoint(saved)
+    else:
+        other.setState(openmm.XmlSerializer.deserialize(saved))
+    assert fresh.getStrain() != 0
+    assert np.array_equal(run(other, fresh, 5), expected)
+    assert np.array_equal(boxOf(other), box) and fresh.getStrain() == strain
+
+
+@pytest.mark.onePrecision
+def testCopiesKeepTheProtocol():
+    integrator = PSEBrownianIntegrator(T, scenes.ETA, 0.5, DT)
+    integrator.setShearRate(0.1)
+    integrator.setShearProtocol(OSCILLATORY, 4.5)
+    text = openmm.XmlSerializer.serialize(integrator)
+    again = PSEBrownianIntegrator.cast(openmm.XmlSerializer.deserialize(text))
+    assert (again.getShearProtocol(), again.getShearTime()._value) == (OSCILLATORY, 4.5)
+    # what was written before there were protocols
+    old = text.replace('shearProtocol="1"', "").replace('shearTime="4.5"', "")
+    assert old != text
+    again = PSEBrownianIntegrator.cast(openmm.XmlSerializer.deserialize(old))
+    assert (again.getShearProtocol(), again.getShearTime()._value) == (STEADY, 0.0)
+    assert again.getShearRate()._value == 0.1
+
+
+# ---------------------------------------------------------------- Forces see the sheared images
+
+@pytest.mark.parametrize("still", [1, 3, 60])
+def testForcesInAShearedBox(platformName, still):
+    """
+    Forces of a running, sheared Context are those of a new one at its positions and box: lists of
+    neighbours have followed, even where no particle but one has moved and only images come nearer
+    (one in `still` particles moves, the others have no mass).
+    """
+    s = suspension(9, 60, 0.25)
+    masses = [100.0 if i % still == 0 else 0.0 for i in range(s.count)]
+    nonbonded = openmm.NonbondedForce()
+    nonbonded.setNonbondedMethod(openmm.NonbondedForce.CutoffPeriodic)
+    nonbonded.setCutoffDistance(1.3)
+    for i in range(s.count):
+        nonbonded.addParticle(0.1*(-1)**i, 0.8, 1.0)
+    custom = repulsion(s)
+    custom.setCutoffDistance(1.3)
+
+    def make(name):
+        return makeContext(s, name, T, 0.2, forces=[copy.deepcopy(nonbonded), copy.deepcopy(custom)],
+                           masses=masses, configure=shear(0.05))
+    context, integrator = make(platformName)
+    reference, _ = make("Reference")
+    for _ in range(20):
+        integrator.step(4)
+        reference.setPeriodicBoxVectors(*boxOf(context))
+        reference.setPositions(positionsOf(context))
+        expected = scenes.forcesOf(reference)
+        found = scenes.forcesOf(context)
+        assert abs(found - expected).max() <= 1e-4*abs(expected).max()
+
+
+# ---------------------------------------------------------------- refusals
+
+@pytest.mark.onePrecision
+def testShearAndABarostatAreRefused(platformName):
+    s = suspension()
+    forces = [scenes.periodicDummyForce(s.count, s.box), openmm.MonteCarloBarostat(1.0, T)]
+    message = messageOf(lambda: makeContext(s, platformName, T, forces=forces,
+                                            configure=shear(0.1)))
+    assertMentions(message, "setShearRate", "MonteCarloBarostat", "remove", "0")
+    forces = [scenes.periodicDummyForce(s.count, s.box), openmm.MonteCarloBarostat(1.0, T)]
+    context, integrator = makeContext(s, platformName, T, forces=forces)
+    assertMentions(messageOf(integrator.setShearRate, 0.1), "MonteCarloBarostat", "remove")
+    assert integrator.getShearRate()._value == 0
+    integrator.step(1)
+
+
+@pytest.mark.deviceOnly
+@pytest.mark.onePrecision
+def testRectangularBoxOnADeviceIsRefused(platformName):
+    """OpenMM's programs for a rectangular box know no tilt: refused, and no flow happens."""
+    s = scenes.randomSuspension(10, 0.1, scenes.cube(1.0), 0.5, 3)
+    message = messageOf(lambda: makeContext(s, platformName, configure=shear(0.1)))
+    assertMentions(message, "setShearRate", "rectangular", "setDefaultPeriodicBoxVectors")
+    context, integrator = makeContext(s, platformName)
+    assertMentions(messageOf(integrator.setShearRate, 0.1), "setDefaultPeriodicBoxVectors")
+    assert integrator.getShearRate()._value == 0
+    integrator.step(1)
+
+
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("arguments, words", [
+    ((OSCILLATORY, 0.0), ["period", "0", "positive"]), ((STARTUP, np.inf), ["time", "inf"]),
+    ((7, 1.0), ["shear protocol", "7"])])
+def testProtocolsThatCannotBe(arguments, words):
+    integrator = PSEBrownianIntegrator(T, scenes.ETA, 0.5, DT)
+    assertMentions(messageOf(integrator.setShearProtocol, *arguments), *words)
+    assert integrator.getShearProtocol() == STEADY
+
+
+@pytest.mark.onePrecision
+def testOnlyMasslessParticles(platformName):
+    """Nothing moves, and the box of a periodic Force tilts all the same."""
+    s = suspension()
+    context, integrator = makeContext(s, platformName, T, DT, masses=[0.0]*s.count,
+                                      forces=[repulsion(s)], configure=shear(0.1))
+    integrator.step(4)
+    assert abs(positionsOf(context) - s.positions).max() < 1e-6
+    assert boxOf(context)[1, 0] == pytest.approx(1e-3*s.box[0, 0] + 0.4*s.box[1, 1], rel=1e-5)
