@@ -6,7 +6,7 @@ test_platforms.py tells it, by a skipped test for each.
 """
 import pytest
 
-from platformnames import DEVICES, MIXTURES, NAMES, VARIANTS, absence, familyOf, isDevice, isDirect
+from platformnames import DEVICES, NAMES, VARIANTS, absence, familyOf, isDevice, isDirect
 
 NOWHERE = pytest.param(None, id="nowhere")
 MARKS = {
@@ -14,7 +14,6 @@ MARKS = {
     "onePrecision": "runs in one precision of a device: what it tests does not depend on it",
     "hostOnly": "not on devices, where what it tests follows from having the noise of the CPU",
     "deviceOnly": "runs on devices alone",
-    "mixture": "on platforms that serve unequal radii",
     "withGrid": "not on a platform that sums directly",
 }
 
@@ -46,8 +45,6 @@ def namesFor(chosen, marks):
         names = [name for name in names if not isDevice(name)]
     if "deviceOnly" in marks:
         names = [name for name in names if isDevice(name)]
-    if "mixture" in marks:
-        names = [name for name in names if familyOf(name) in MIXTURES]
     if "withGrid" in marks:
         names = [name for name in names if not isDirect(name)]
     if "onePlatform" in marks:

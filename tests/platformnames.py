@@ -13,8 +13,6 @@ DEVICES = ("OpenCL", "CUDA")
 VARIANTS = {"Reference": ("Reference",), "CPU": ("CPU",),
             **{device: tuple(f"{device}-{precision}" for precision in PRECISIONS)
                for device in DEVICES}}
-# that serve unequal radii in a periodic fluid; the others refuse them
-MIXTURES = ("Reference", "CPU", *DEVICES)
 NAMES = tuple(name for names in VARIANTS.values() for name in names)
 
 

@@ -10,7 +10,7 @@ import openmm
 import pytest
 
 from openmmpse import PSEBrownianIntegrator
-from platformnames import MIXTURES, familyOf, isDirect, served
+from platformnames import isDirect, served
 import scenes
 from scenes import (Scene, assertUnitCovariance, errorOf, errorRatio, forceKinds, makeContext, mixture,
                     mobilityColumns, randomForces, stored, whiten)
@@ -75,7 +75,6 @@ def ofOneSize(s, size):
 
 # ---------------------------------------------------------------- the contract
 
-@pytest.mark.mixture
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("split", ["automatic", "Hasimoto"])
 def testErrorContract(platformName, name, split):
@@ -95,7 +94,6 @@ def testErrorContract(platformName, name, split):
     assert not failures, "; ".join(failures)
 
 
-@pytest.mark.mixture
 @pytest.mark.parametrize("name", ["twoSizesOverlapping", "nested", "smallBox"])
 def testWorstForce(platformName, name):
     """The whole error matrix, forces measured by the velocities that they would give alone."""
@@ -107,7 +105,6 @@ def testWorstForce(platformName, name):
         assert np.linalg.norm(error/own, 2) <= 3*tolerance
 
 
-@pytest.mark.mixture
 @pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
 def testSymmetryAndPositivity(platformName, split):
     """Any overlap and nesting, coincident equal spheres included: M' is symmetric and >= 0."""
@@ -123,7 +120,6 @@ def testSymmetryAndPositivity(platformName, split):
     assert abs(eigenvalues[:3]).max() < rounding      # the coincident pair: no relative mobility
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 @pytest.mark.parametrize("split, values", [("Prolate", (0.25, 0.45, 0.9)), ("Hasimoto", (0.35, 0.6, 1.1))])
 def testSplittingParameterDoesNotMatter(platformName, split, values):
@@ -138,7 +134,6 @@ def testSplittingParameterDoesNotMatter(platformName, split, values):
         assert ratio <= 1, f"xi = {xi}: error {ratio:.2f} tolerance, {parameters}"
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 @pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
 @pytest.mark.parametrize("name", ["twoSizesOverlapping", "continuous", "smallBox"])
@@ -154,7 +149,6 @@ def testPlanIsReproduced(platformName, name, split):
     assert np.array_equal(copy.applyMobility(forces), integrator.applyMobility(forces))
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 def testSizesAHundredTimesApart(platformName):
     """Two classes, a small sphere inside a large one; or a refusal that says what to do."""
@@ -175,7 +169,6 @@ def testSizesAHundredTimesApart(platformName):
 
 # ---------------------------------------------------------------- noise
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 @pytest.mark.parametrize("split", ["Prolate", "Hasimoto"])
 def testCovarianceIsThatOfTheMobility(platformName, split):
@@ -205,7 +198,6 @@ def testEqualRadiiTakeThePathOfOneRadius(platformName):
     assert found[0][2] == found[1][2]
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 def testMasslessParticlesKeepTheirRadiiToThemselves(platformName):
     """Radii belong to particles of the System, also where some of them do not feel the fluid."""
@@ -220,7 +212,6 @@ def testMasslessParticlesKeepTheirRadiiToThemselves(platformName):
     assert errorRatio(u[mobile], alone.velocities(forces[mobile]), forces[mobile], alone) <= 1e-3
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 def testDescription(platformName):
     context, integrator = makeContext(scene("fiveSizes", 40), platformName)
@@ -231,7 +222,6 @@ def testDescription(platformName):
     assert "functions of the radius" in integrator.describe()
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 def testCheckpointOfOtherRadiiIsRefused(platformName):
     """Two spheres have changed places; all numerical parameters are the same."""
@@ -246,7 +236,6 @@ def testCheckpointOfOtherRadiiIsRefused(platformName):
     context.loadCheckpoint(checkpoint)
 
 
-@pytest.mark.mixture
 @pytest.mark.onePrecision
 def testRefusalsNameValueLimitAndRemedy(platformName):
     s = scene("continuous", 40)
@@ -264,11 +253,3 @@ def testRefusalsNameValueLimitAndRemedy(platformName):
             (messageOf("Hasimoto", xi=0.5, realCutoff=4.0), ("0.5 /nm", "4 nm", "0.0001", "larger"))):
         for word in words:
             assert word in message, message
-
-
-@pytest.mark.onePrecision
-def testOtherPlatformsRefuse(platformName):
-    if familyOf(platformName) in MIXTURES:
-        return
-    with pytest.raises(openmm.OpenMMException, match="unequal radii are not available with hydrodynamics"):
-        makeContext(scene("pair", 2), platformName)

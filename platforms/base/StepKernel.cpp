@@ -160,7 +160,6 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
         planUnbounded(integrator);
         return;
     }
-    requireServedRadii();
     const NumericalParameters& wish = integrator.getRequestedNumericalParameters();
     PlanOverrides overrides;
     overrides.xi = wish.xi;
@@ -189,22 +188,6 @@ void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
     const UnboundedPlan made = makeUnboundedPlan(wanted, scene.radii);
     useUnbounded(made);
     unboundedPlan.reset(new UnboundedPlan(made));
-}
-
-void PlannedStepKernel::requireServedRadii() {
-    if (servesMixtures() || !isMixture(scene.radii))
-        return;
-    size_t i = 1;
-    while (scene.radii[i] == scene.radii[0])
-        i++;
-    std::ostringstream message;
-    message << "PSEBrownianIntegrator: particle " << scene.mobile[i] << " has radius "
-            << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has " << scene.radii[0]
-            << " nm, and unequal radii are not available with hydrodynamics on the "
-            << getPlatform().getName()
-            << " platform; use the Reference platform, give all particles one radius, or use "
-               "setMobilityModel(FreeDraining)";
-    throw OpenMMException(message.str());
 }
 
 Lattice PlannedStepKernel::currentBox() const {

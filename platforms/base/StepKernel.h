@@ -66,8 +66,6 @@ protected:
     virtual void setEngineBox(const numerics::Lattice& box) = 0;
     /** Each particle moves for itself: no hydrodynamics, or no mobile particle; no Plan. */
     virtual void useFreeDraining() = 0;
-    /** Whether useEngine() can use a Plan for unequal radii. */
-    virtual bool servesMixtures() const { return false; }
     /** Of the last thermal step. */
     virtual int lanczosIterations() const = 0;
     /** As getNumericalParameters() tells it; without a Plan, it has no split. */
@@ -119,8 +117,6 @@ private:
     numerics::PlanRequest requestOf(const StepState& state) const;
     void use(const Prepared& next, const numerics::Lattice& box);
     void planUnbounded(const PSEBrownianIntegrator& integrator);
-    /** @throws OpenMMException naming two unequal radii, if the platform cannot do them */
-    void requireServedRadii();
     NumericalParameters parametersOf(const numerics::Plan& plan) const;
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
     std::string signature(const numerics::Plan& plan) const;

@@ -40,7 +40,6 @@ protected:
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void setEngineBox(const numerics::Lattice& box) override { useEngine(plan(), box); }
     void useFreeDraining() override;
-    bool servesMixtures() const override { return true; }
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan&) const override { return precisionName(); }
     std::string precisionName(const numerics::UnboundedPlan&) const override {

@@ -33,7 +33,6 @@ protected:
     void useUnbounded(const numerics::UnboundedPlan& plan) override;
     void setEngineBox(const numerics::Lattice& box) override { engine->setBox(box); }
     void useFreeDraining() override;
-    bool servesMixtures() const override { return factory->servesMixtures(); }
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan& plan) const override;
     std::string precisionName(const numerics::UnboundedPlan& plan) const override;

@@ -41,8 +41,6 @@ public:
 class EngineFactory {
 public:
     virtual ~EngineFactory() = default;
-    /** Whether create() makes an engine of a Plan for unequal radii. */
-    virtual bool servesMixtures() const { return false; }
     /** Fill in what the platform knows of the request: its precision and its costs. */
     virtual void adapt(numerics::PlanRequest& request) const = 0;
     /**

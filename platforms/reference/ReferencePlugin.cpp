@@ -17,7 +17,6 @@ namespace {
 
 class ReferenceEngineFactory : public EngineFactory {
 public:
-    bool servesMixtures() const override { return true; }
     void adapt(numerics::PlanRequest& request) const override {
         request.singleFloor = std::numeric_limits<double>::infinity();
         request.directSums = true;

@@ -21,7 +21,6 @@ constexpr double SINGLE_PRECISION_FLOOR = 1e-5;
 
 class CpuEngineFactory : public EngineFactory {
 public:
-    bool servesMixtures() const override { return true; }
     explicit CpuEngineFactory(CpuPlatform::PlatformData& data) : pool(data.threads), lists(data) {}
     void followBox(const std::vector<Vec3>& positions, const Vec3* box) override {
         lists.follow(positions, box);
