@@ -248,12 +248,13 @@ Magnification MixtureErrors::magnification(const Mixture& mixture, const std::ar
         const double k = cell.k[q].norm();
         if (k >= end)
             continue;
-        const double b = FACTOR * mixture.envelope(k) / std::max(k * k, 1e-6),
+        const double full = FACTOR * mixture.envelope(k) / (k * k),
+                     b = full * k * k / (k * k + damping),
                      inverse = window.transform(0) / window.transform(k);
         const double square = inverse * inverse * cell.weight[q] * 2 / 3;
         const Eigen::VectorXd one = sincs(k, radii).square();
         pairs.pairs += square * b * b * one * noise.matrix().transpose();
-        both.self += square * b * noise;
+        both.self += square * full * noise;
     }
     both.self = both.self.square();
     return {worst(pairs), worst(both)};

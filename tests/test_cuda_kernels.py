@@ -87,8 +87,21 @@ def recordScenes():
         tightest = (*loosest[:2], 1e-6 if precision == "double" else 1e-4)
         for scene, split, tolerance in [*runs, loosest, tightest]:
             runOnOpenCL(scene, precision, tolerance, lambda it: it.setSplit(split))
+        for scene, tolerance in unequalSpheres():
+            runOnOpenCL(scene, precision, tolerance, lambda it: None)
         freely = PSEBrownianIntegrator.FreeDraining
         runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setMobilityModel(freely))
+
+
+def unequalSpheres():
+    """Classes and interpolated radii; one box needs images, one is tilted."""
+    few, many = np.where(np.arange(20) % 5 == 0, 1.0, 0.4), np.linspace(0.4, 0.9, 20)
+    small = scenes.mixture(few, 0.1, scenes.cube(1), 4)
+    return [
+        (small, 1e-3),
+        (scenes.mixture(many, 0.1, scenes.tilted(1), 5), 1e-2),
+        (scenes.Scene(small.positions[:5], scenes.cube(3.0), 0.4, few[:5]), 1e-3),
+    ]
 
 
 def runOnOpenCL(scene, precision, tolerance, configure):

@@ -6,8 +6,8 @@ import pytest
 
 import openmmpse
 from platformnames import contextOn, familyOf
-from scenes import (ETA, Scene, constantForces, cube, makeContext, makeSystem, positionsOf, randomForces,
-                    randomSuspension)
+from scenes import (ETA, Scene, constantForces, cube, makeContext, makeSystem, mixture, positionsOf,
+                    randomForces, randomSuspension, tilted)
 
 pytestmark = [pytest.mark.deviceOnly, pytest.mark.onePrecision]
 L, RADIUS = 40.0, 0.5
@@ -67,6 +67,52 @@ def testStrongOverlapsNeedNoMoreIterationsThanOnTheCpu(platformName):
         iterations.append(plan["lanczosIterations"])
     assert iterations[1] == iterations[0] > 50
     assert np.linalg.norm(draws[1] - draws[0]) < 1e-9*np.linalg.norm(draws[0])
+
+
+def unequal():
+    """Three size groups, one sphere inside another, and a range that is not that of all pairs."""
+    radii = np.where(np.arange(60) % 20 == 0, 3.0, np.where(np.arange(60) % 3 == 0, 0.9, 0.4))
+    scene = mixture(radii, 0.2, tilted(1.0), seed=6)
+    scene.positions[1] = scene.positions[0] + [0.5, 0, 1.0]
+    return scene
+
+
+def testUnequalSpheresDifferByRoundingBetweenPrecisions(platformName):
+    """Rows of each size group, cells of their own: what single precision finds, double precision does."""
+    scene, plan = unequal(), {}
+    found = []
+    for precision in ("single", "double"):
+        _, integrator = makeContext(scene, f"{familyOf(platformName)}-{precision}", temperature=300.0, tolerance=1e-3,
+                                    configure=lambda one: one.setNumericalParameters(plan))
+        plan = integrator.getNumericalParameters()
+        found.append((integrator.applyMobility(randomForces(scene)), integrator.sampleBrownianDisplacements(1)))
+    for single, double in zip(*found):
+        assert 0 < np.linalg.norm(single - double) < 10*ROUNDING*np.linalg.norm(double)
+
+
+def testUnequalSpheresContinueFromACheckpointToTheBit(platformName):
+    scene = unequal()
+    context, integrator = makeContext(scene, platformName, temperature=300.0, stepSize=1.0)
+    integrator.step(2)
+    checkpoint = context.createCheckpoint()
+    integrator.step(2)
+    uninterrupted = positionsOf(context)
+    other, fresh = makeContext(scene, platformName, temperature=300.0, stepSize=1.0, seed=99)
+    other.loadCheckpoint(checkpoint)
+    fresh.step(2)
+    assert np.array_equal(positionsOf(other), uninterrupted)
+
+
+def testRowsOfUnequalSpheresGrow(platformName):
+    """Hundreds of neighbours in a box whose mean density promises few: all of them are found."""
+    rng = np.random.default_rng(7)
+    x = L/2 + 1.5*rng.normal(size=(150, 3))
+    scene = Scene(x.astype(np.float32).astype(float), cube(L), RADIUS, np.where(np.arange(150) % 10 == 0, 1.5, 0.4))
+    _, integrator = makeContext(scene, platformName, tolerance=1e-3)
+    _, reference = makeContext(scene, "Reference", tolerance=1e-6)
+    forces = randomForces(scene)
+    exact = reference.applyMobility(forces)
+    assert np.linalg.norm(integrator.applyMobility(forces) - exact) < 1e-3*np.linalg.norm(exact)
 
 
 def testTooLongAStepNamesItsParticle(platformName):
