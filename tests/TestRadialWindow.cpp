@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The window of unequal spheres, each number against quadrature in extended precision.
 
+#include "numerics/GridMetric.h"
 #include "numerics/RadialWindow.h"
+#include "numerics/Vec3.h"
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -76,6 +78,26 @@ double sinc(double x) {
 }
 
 } // namespace
+
+/** By vectors: the box is oblique, its grid coarse and unequal. */
+TEST(GridMetric, MeasuresDistancesAsVectorsDo) {
+    const Lattice box(Vec3(9, 0, 0), Vec3(4.5, 8, 0), Vec3(-4.5, 4, 7));
+    const std::array<int, 3> grid = {10, 12, 9};
+    const double unit = 0.8;
+    const GridMetric metric(box, grid, unit);
+    for (const Vec3& n : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(2.5, -1.25, 3.75),
+                          Vec3(-0.1, 4, 0.3), Vec3(0, 0, 0)}) {
+        const double exact =
+            box.cartesian(Vec3(n[0] / grid[0], n[1] / grid[1], n[2] / grid[2])).squaredNorm() /
+            (unit * unit);
+        const double y = n[1] - metric.skewY * n[0],
+                     z = n[2] - metric.skewX * n[0] - metric.skewZ * n[1];
+        EXPECT_NEAR(metric.plane * n[0] * n[0] + metric.line * y * y + metric.point * z * z, exact,
+                    1e-13 * (1 + exact));
+    }
+    for (int d = 0; d < 3; d++) // a ball as wide as the box touches all points of an axis
+        EXPECT_NEAR(metric.pointsPerLength[d] * box.width(d) / unit, grid[d], 1e-12);
+}
 
 TEST(RadialWindow, AverageIsThatOverTheSphere) {
     for (const auto& s : SHAPES) {
