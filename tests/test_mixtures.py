@@ -10,7 +10,7 @@ import openmm
 import pytest
 
 from openmmpse import PSEBrownianIntegrator
-from platformnames import isDirect, served
+from platformnames import isDevice, isDirect, served
 import scenes
 from scenes import (Scene, assertUnitCovariance, errorOf, errorRatio, forceKinds, makeContext, mixture,
                     mobilityColumns, randomForces, stored, whiten)
@@ -68,6 +68,12 @@ def withSplit(split, configure=lambda integrator: None):
     return both
 
 
+def servedMixture(platformName, tolerance):
+    """In single precision below 1e-4 mixtures of widely different radii are refused."""
+    single = isDevice(platformName) and not platformName.endswith("double")
+    return max(served(platformName, tolerance), 1e-4 if single else 0)
+
+
 def ofOneSize(s, size):
     """Random forces on the largest or the smallest spheres alone."""
     return randomForces(s)*(s.radii == size(s.radii))[:, None]
@@ -80,7 +86,7 @@ def ofOneSize(s, size):
 def testErrorContract(platformName, name, split):
     s = sceneFor(name, platformName)
     failures = []
-    for tolerance in sorted({served(platformName, t) for t in (1e-2, 1e-3, 1e-5)}):
+    for tolerance in sorted({servedMixture(platformName, t) for t in (1e-2, 1e-3, 1e-5)}):
         context, integrator = makeContext(s, platformName, tolerance=tolerance, configure=withSplit(split))
         parameters = integrator.getNumericalParameters()
         assert 0 < parameters["predictedError"] <= tolerance
@@ -98,7 +104,7 @@ def testErrorContract(platformName, name, split):
 def testWorstForce(platformName, name):
     """The whole error matrix, forces measured by the velocities that they would give alone."""
     s = scene(name, 20)
-    for tolerance in (1e-2, served(platformName, 1e-5)):
+    for tolerance in (1e-2, servedMixture(platformName, 1e-5)):
         context, integrator = makeContext(s, platformName, tolerance=tolerance)
         error = mobilityColumns(integrator, s.count) - stored(s, context).mobility
         own = np.repeat(s.ownMobilities.ravel(), 3)
@@ -113,7 +119,7 @@ def testSymmetryAndPositivity(platformName, split):
     tolerance = 1e-2
     context, integrator = makeContext(s, platformName, tolerance=tolerance, configure=withSplit(split))
     M = mobilityColumns(integrator, s.count)/s.mu0
-    rounding = 1e-11 if integrator.getNumericalParameters()["precision"] == "double" else 5e-6
+    rounding = 1e-11 if integrator.getNumericalParameters()["precision"] == "double" else 2e-5
     assert np.linalg.norm(M - M.T, 2) < rounding
     eigenvalues = np.linalg.eigvalsh(0.5*(M + M.T))
     assert eigenvalues[0] > -rounding
