@@ -13,10 +13,8 @@ namespace PSE {
  * Makes the neighbour list of OpenMM's CPU platform follow a box that moves. OpenMM makes its list
  * anew when particles have moved, and compares their unwrapped positions for it: images that come
  * nearer because the box has changed go unnoticed. From the first change of the box on, the list is
- * made anew here: whenever the box changes, and whenever a particle has moved by a quarter of the
- * list's margin since. A list of OpenMM's own in between, at positions within a quarter of the
- * margin too, is then good for all pairs: two particles move by four quarters at most against each
- * other. Without a change of the box nothing happens.
+ * made anew here as soon as a pair that is not on it might have come within the cut-off, whether or
+ * not OpenMM has made one in between. Without a change of the box nothing happens.
  */
 class NeighbourListKeeper {
 public:
@@ -25,13 +23,15 @@ public:
 
 private:
     using Box = std::array<OpenMM::Vec3, 3>;
-    bool movedFar(const std::vector<OpenMM::Vec3>& positions) const;
+    bool stillServes(const std::vector<OpenMM::Vec3>& positions, const Box& box);
     void makeList(const std::vector<OpenMM::Vec3>& positions, const Box& box);
 
     OpenMM::CpuPlatform::PlatformData& data;
     bool boxSeen = false, boxMoved = false;
-    Box lastBox;
-    std::vector<OpenMM::Vec3> lastPositions; ///< when the list was made here
+    Box lastBox, listBox;
+    std::vector<OpenMM::Vec3> listPositions; ///< when the list was made here, in listBox
+    double largestStrain = 0,
+           largestWay = 0; ///< since then: of the box, and of particles beyond it
 };
 
 } // namespace PSE
