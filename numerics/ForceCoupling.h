@@ -54,6 +54,16 @@ inline PairScalars forceCouplingScalars(double r, double ai, double aj) {
     return {s.F, s.F + s.C * r * r};
 }
 
+/**
+ * The smooth scalars of two spheres of radius 1 without the tail of their envelopes, which decays
+ * as exp(-pi r^2/4): what any weight 1 - k^2/pi + O(k^4) has in common with theirs far away [T42];
+ * r > 0.
+ */
+inline SmoothScalars forceCouplingFarField(double r) {
+    const double q = 2 * ENVELOPE_VARIANCE / (r * r);
+    return {0.75 / r * (1 + q), 0.75 / (r * r * r) * (1 - 3 * q)};
+}
+
 } // namespace PSE::numerics
 
 #endif

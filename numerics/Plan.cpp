@@ -82,7 +82,7 @@ void checkPlan(const Plan& plan, const PlanRequest& request) {
         if (!message.str().empty())
             throw std::invalid_argument(message.str());
     }
-    if (plan.realCutoff < 2 * plan.a) {
+    if (plan.hasRealHalf() && plan.realCutoff < 2 * plan.a) {
         message << "real-space cutoff " << plan.realCutoff
                 << " nm is below the distance of two touching particles, " << 2 * plan.a
                 << " nm; leave the cutoff 0 for the automatic one";
@@ -131,12 +131,11 @@ Plan hasimotoPlan(const PlanRequest& request, const std::string& reason) {
     return plan;
 }
 
-/** Whether the caller has left so little open that the splits cannot be compared. */
+} // namespace
+
 bool isPrescribed(const PlanOverrides& wish) {
     return wish.xi > 0 || wish.realCutoff > 0 || wish.bandwidth > 0;
 }
-
-} // namespace
 
 bool isMixture(const std::vector<double>& radii) {
     return std::any_of(radii.begin(), radii.end(), [&](double a) { return a != radii[0]; });
@@ -152,6 +151,12 @@ Plan makePlan(const PlanRequest& request) {
         return plan;
     }
     checkRequest(request);
+    if (request.model == SphereModel::ForceCoupling)
+        return makeForceCouplingPlan(request);
+    if (request.split == SplitChoice::AllWaves)
+        throw std::invalid_argument(
+            "the waves of the Rotne-Prager-Yamakawa mobility decay too slowly to do without a "
+            "real half; use setSplit(AutomaticSplit), or setMobilityModel(ForceCoupling)");
     if (request.split == SplitChoice::Hasimoto)
         return hasimotoPlan(request, "as prescribed");
     const ProlatePlans family(request);

@@ -2,7 +2,7 @@
 #ifndef OPENMMPSE_NUMERICS_PLAN_H_
 #define OPENMMPSE_NUMERICS_PLAN_H_
 
-// One tolerance becomes numbers here and nowhere else [T11-T16, T22, T23]. Lengths in nm.
+// One tolerance becomes numbers here and nowhere else [T11-T16, T22, T23, T44]. Lengths in nm.
 
 #include "numerics/Lattice.h"
 #include "numerics/Mixture.h"
@@ -20,7 +20,8 @@ enum class Precision { Single, Double };
 enum class SplitChoice {
     Automatic, ///< prolate where valid, unless Hasimoto's is cheaper by more than a few percent
     Prolate,   ///< or a refusal
-    Hasimoto
+    Hasimoto,  ///< not for force coupling
+    AllWaves   ///< no real half: for force coupling alone
 };
 
 /** What a caller may prescribe; zero means automatic. */
@@ -56,6 +57,7 @@ struct PlanRequest {
     /// there.
     bool moving = false;
     double shortest = 1;
+    SphereModel model = SphereModel::RotnePragerYamakawa;
 };
 
 /** Everything a platform needs to know about the numerics. */
@@ -66,9 +68,9 @@ struct Plan {
     /// radius; of a mixture 1/sqrt(mean of 1/a_i^2), so that unit forces have mobilities of 1
     double a;
     std::string splitReason; ///< why this one, in words
-    double xi;               ///< splitting parameter (1/nm); of the prolate split 1/range
+    double xi;               ///< splitting parameter (1/nm); of the prolate split 1/range; or 0
     double bandwidth;        ///< c of the prolate split, else 0
-    double realCutoff;       ///< range of the real half
+    double realCutoff;       ///< range of the real half; 0 where there is none
     /// the range exceeds half the box: sum explicitly over all images
     bool sumImages;
     std::array<int, 3> grid; ///< M_d
@@ -88,6 +90,8 @@ struct Plan {
 
     /** Of the split, whichever there is. */
     std::string splitName() const { return mixture ? mixture->name() : split->name(); }
+    /** Whether anything is left for real space: neighbours, pairs, a square root of its own. */
+    bool hasRealHalf() const { return realCutoff > 0; }
     /** Number of grid points; double, because a request may exceed any integer. */
     double gridPoints() const { return double(grid[0]) * grid[1] * grid[2]; }
 };

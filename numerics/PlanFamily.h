@@ -20,6 +20,9 @@ constexpr double LARGEST_LIST_RANGE = 0.499;
 /// grid points along one axis; beyond, nothing can be allocated
 constexpr double WIDEST_GRID = 32768;
 
+/// of the tolerance for the wave half where it has all the error there is. Measured errors reach
+/// 0.85 of the estimate for uniform forces.
+constexpr double WAVE_BUDGET = 0.9;
 constexpr int LARGEST_SUPPORT = 16; ///< what platforms have room for
 /// times the unit of a family: the finest Nyquist wave number at which a grid is sought
 constexpr double FINEST = 2.2;
@@ -29,6 +32,10 @@ double volumeFraction(const PlanRequest& request);
 double narrowestWidth(const PlanRequest& request);
 /** @throws std::invalid_argument naming what cannot be */
 void checkPlan(const Plan& plan, const PlanRequest& request);
+/** Whether the caller has left so little open that the splits cannot be compared. */
+bool isPrescribed(const PlanOverrides& wish);
+/** makePlan() for force coupling [T44]. */
+Plan makeForceCouplingPlan(const PlanRequest& request);
 
 /** What the families share; lengths in radii inside. */
 class PlanFamily {
@@ -95,7 +102,25 @@ private:
     double nyquistOf(const Plan& plan) const { return plan.split->waveCutoff(error, phi); }
 };
 
-/** Plans with the prolate split, by its range R: the real half has no error of its own. */
+/** The one Plan of force coupling without a split. */
+class AllWavesPlans : public PlanFamily {
+public:
+    /** @param wideWindows  also those that bear coarser grids: points are what costs here */
+    AllWavesPlans(const PlanRequest& request, bool wideWindows);
+    /** @throws std::invalid_argument naming what cannot be met */
+    Plan best() const;
+
+protected:
+    std::vector<int> supports() const override;
+
+private:
+    bool wideWindows;
+};
+
+/**
+ * Plans with the prolate split, by its range R: the real half has no error of its own, but for the
+ * tail of force coupling.
+ */
 class ProlatePlans : public PlanFamily {
 public:
     explicit ProlatePlans(const PlanRequest& request);
@@ -108,6 +133,8 @@ public:
 private:
     /** The smallest bandwidth whose dropped waves keep their share; nothing if none does. */
     std::optional<double> bandwidthFor(double R) const;
+    /** Whether what force coupling leaves beyond a range is little beside the tolerance. */
+    bool coversTail(const ProlateSplit& split) const;
     bool isValid(double R) const;
     /** The smallest range at which the split is valid at this tolerance; infinite if none is. */
     double smallestRange() const;

@@ -10,9 +10,8 @@ namespace PSE::numerics {
 
 namespace {
 
-/// of the tolerance for the wave half: all the error there is. Measured errors reach 0.85 of the
-/// estimate for uniform forces.
-constexpr double WAVE_BUDGET = 0.9;
+/// of the wave half's budget for the tail of force coupling beyond the range, which adds in squares
+constexpr double TAIL_SHARE = 0.3;
 /// of that for the dropped waves, the rest for the grid: the cheapest division, and a flat optimum
 constexpr double DROPPED_SHARE = 0.6;
 /// bandwidths are multiples of this: the same on machines that round differently
@@ -21,10 +20,6 @@ constexpr double BANDWIDTH_STEP = 1.0 / 64;
 constexpr double FINE_FACTOR = 1.04, FACTOR = 1.12;
 /// radii: here even the tightest tolerance has a valid range
 constexpr double AMPLE_RANGE = 32;
-
-std::shared_ptr<const ProlateSplit> splitOf(double c, double R) {
-    return std::make_shared<const ProlateSplit>(c, R);
-}
 
 /** Whether xi and cut-off, where both are given, are those of one range. */
 bool isOneRange(const PlanOverrides& wish) {
@@ -40,6 +35,17 @@ double largestRange(const PlanRequest& request) {
     return LARGEST_LIST_RANGE * narrowestWidth(request);
 }
 
+/** The range (nm) up to which there are tables of the real half. */
+double resolvedRange(const PlanRequest& request) {
+    if (request.model != SphereModel::ForceCoupling)
+        return std::numeric_limits<double>::infinity();
+    // a prescribed range may cost the precision
+    const bool single = request.singleOnly || (request.tolerance >= request.singleFloor &&
+                                               !isPrescribed(request.overrides));
+    return request.radius *
+           (single ? ProlateSplit::SINGLE_RESOLVED : ProlateSplit::DOUBLE_RESOLVED);
+}
+
 } // namespace
 
 ProlatePlans::ProlatePlans(const PlanRequest& request) : PlanFamily(request, WAVE_BUDGET) {}
@@ -48,7 +54,7 @@ std::optional<double> ProlatePlans::bandwidthFor(double R) const {
     if (request.overrides.bandwidth > 0)
         return request.overrides.bandwidth;
     const auto suffices = [&](double c) {
-        const ProlateSplit split(c, R);
+        const ProlateSplit split(c, R, request.model);
         // a zero or negative matching term comes with bandwidths that are too large already
         return split.matching() <= 0 ||
                split.waveTruncation(split.firstZero(), phi) <= DROPPED_SHARE * error;
@@ -66,7 +72,14 @@ std::optional<double> ProlatePlans::bandwidthFor(double R) const {
 
 bool ProlatePlans::isValid(double R) const {
     const std::optional<double> c = bandwidthFor(R);
-    return c && ProlateSplit(*c, R).isPositive();
+    if (!c)
+        return false;
+    const ProlateSplit split(*c, R, request.model);
+    return split.isPositive() && coversTail(split);
+}
+
+bool ProlatePlans::coversTail(const ProlateSplit& split) const {
+    return split.realTruncation(split.range(), phi, meanPhi) <= TAIL_SHARE * error;
 }
 
 double ProlatePlans::smallestRange() const {
@@ -95,6 +108,11 @@ std::string ProlatePlans::obstacleTo(double R) const {
         message << "a prolate range of " << a * R << " nm is more than " << LARGEST_LIST_RANGE
                 << " of the smallest box width " << narrowestWidth(request)
                 << " nm; use a larger splitting parameter (1/range) or a larger box";
+    else if (R > 0 && a * R > resolvedRange(request))
+        message << "a prolate range of " << a * R << " nm is more than the "
+                << resolvedRange(request)
+                << " nm that tables of force coupling serve; use a larger splitting parameter "
+                   "(1/range)";
     else if (request.overrides.bandwidth > 0)
         message << "a prolate bandwidth of " << request.overrides.bandwidth
                 << " makes the real half negative at every range asked for; leave "
@@ -107,7 +125,10 @@ std::string ProlatePlans::obstacleTo(double R) const {
     else
         message << "a prolate range of " << a * R << " nm is below the " << smallest
                 << " nm that tolerance " << request.tolerance
-                << " needs for a positive real half; use a smaller splitting parameter (1/range) "
+                << (request.model == SphereModel::ForceCoupling
+                        ? " needs for the Gaussian tail of force coupling; use"
+                        : " needs for a positive real half; use")
+                << " a smaller splitting parameter (1/range) "
                    "or a looser tolerance";
     return message.str();
 }
@@ -122,6 +143,10 @@ std::string ProlatePlans::missedTolerance(const Plan& plan) const {
         message << "a prolate bandwidth of " << plan.bandwidth << " leaves an error of " << dropped
                 << ", the tolerance is " << request.tolerance
                 << "; prescribe a larger bandwidth, or 0 for the automatic one";
+    else if (realErrorOf(plan) > request.tolerance)
+        message << "a range of " << plan.realCutoff << " nm leaves an error of "
+                << realErrorOf(plan) << " beyond it, the tolerance is " << request.tolerance
+                << "; prescribe a longer range, or 0 for the automatic one";
     else
         message << windowRefusal(plan, plan.predictedError);
     return message.str();
@@ -138,8 +163,9 @@ std::optional<Plan> ProlatePlans::at(double R) const {
     plan.xi = (wish.xi > 0 ? wish.xi : 1 / plan.realCutoff);
     plan.bandwidth = *c;
     // of the very quotient that the tables are asked for
-    const auto split = splitOf(*c, plan.realCutoff / plan.a);
-    if (!split->isPositive())
+    const auto split =
+        std::make_shared<const ProlateSplit>(*c, plan.realCutoff / plan.a, request.model);
+    if (!split->isPositive() || (wish.bandwidth == 0 && !coversTail(*split)))
         return std::nullopt;
     plan.split = split;
     completeRealHalf(plan);
@@ -158,7 +184,8 @@ std::optional<Plan> ProlatePlans::at(double R) const {
 
 std::optional<Plan> ProlatePlans::best(std::string& obstacle) const {
     const PlanOverrides& wish = request.overrides;
-    const double a = request.radius, largest = largestRange(request) / a;
+    const double a = request.radius,
+                 largest = std::min(largestRange(request), resolvedRange(request)) / a;
     const double given =
         (wish.realCutoff > 0 ? wish.realCutoff / a : (wish.xi > 0 ? 1 / (wish.xi * a) : 0));
     const double smallest = (given > 0 ? given : smallestRange());

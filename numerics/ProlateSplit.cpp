@@ -21,10 +21,11 @@ double horner(const std::vector<double>& series, double t) {
 
 } // namespace
 
-ProlateSplit::ProlateSplit(double bandwidth, double range) : psi(bandwidth), R(range) {
+ProlateSplit::ProlateSplit(double bandwidth, double range, SphereModel model)
+    : Split(model), psi(bandwidth), R(range) {
     const double c = bandwidth;
-    // H0 = 1 + h2 k^2 + ..., h2 = -chi R^2/(2 c^2) by the equation of psi at 0; the sphere has 1/3
-    s = 0.5 * (1 - 2 * c * c / (3 * psi.eigenvalue() * R * R));
+    // H0 = 1 + h2 k^2 + ..., h2 = -chi R^2/(2 c^2) by the equation of psi at 0; the sphere has 1/m
+    s = 0.5 * (1 - 2 * c * c / (secondOrder(model) * psi.eigenvalue() * R * R));
     slope = psi.series().timesSlope();
     W = psi.series().plus(-s, slope);
     k0 = findZero();
@@ -63,6 +64,8 @@ double ProlateSplit::waveWeight(double k) const {
 
 SmoothScalars ProlateSplit::waveScalars(double r) const {
     if (r > R) {
+        if (model() == SphereModel::ForceCoupling)
+            return forceCouplingFarField(r);
         const PairScalars rpy = rpyScalars(r);
         return {rpy.F, (rpy.G - rpy.F) / (r * r)};
     }
@@ -70,12 +73,22 @@ SmoothScalars ProlateSplit::waveScalars(double r) const {
     return {horner(seriesF, t), horner(seriesC, t)};
 }
 
+double ProlateSplit::maxDistance() const {
+    return model() == SphereModel::ForceCoupling ? std::max(R, LARGEST_TAIL) : R;
+}
+
 double ProlateSplit::tableRange(bool single) const {
-    return single && psi.bandwidth() > SINGLE_BANDWIDTH ? 0 : R;
+    if (single && psi.bandwidth() > SINGLE_BANDWIDTH)
+        return 0;
+    if (model() == SphereModel::ForceCoupling)
+        return std::min(R, single ? SINGLE_RESOLVED : DOUBLE_RESOLVED);
+    return R;
 }
 
 bool ProlateSplit::isPositive() const {
-    return k0 <= LARGEST_ZERO && s >= SMALLEST_MATCHING && R >= SMALLEST_RANGE;
+    // a Gaussian has no zero that k0 might come near to
+    const bool below = (model() == SphereModel::ForceCoupling || k0 <= LARGEST_ZERO);
+    return below && s >= SMALLEST_MATCHING && R >= SMALLEST_RANGE;
 }
 
 /**
@@ -135,29 +148,26 @@ Split::DroppedWaves ProlateSplit::droppedWaves(const std::array<double, 3>& face
     const double nearest = *std::min_element(faces.begin(), faces.end());
     if (nearest >= k0)
         return beyond;
-    // w ends so close to the faces that the sphere inside them would count far too much: of a shell
-    // of radius k, the two caps beyond a pair of faces at f are 1 - f/k.
-    const auto share = [&](double k) {
-        double outside = 0;
-        for (double face : faces)
-            outside += std::max(0.0, 1 - face / k);
-        return std::min(1.0, outside);
-    };
-    const DroppedWaves inside = integrateWaves(nearest, k0, share);
+    // w ends so close to the faces that the sphere inside them would count far too much
+    const DroppedWaves inside = integrateOutside(faces, k0);
     return {beyond.pairs + inside.pairs, beyond.self + inside.self};
 }
 
 double ProlateSplit::realTruncation(double rc, double phi, double meanPhi) const {
-    if (rc >= R)
-        return 0;
-    const Quadrature rule = gaussLegendre(64, std::max(rc, CONTACT), R);
     double random = 0, coherent = 0;
-    for (size_t i = 0; i < rule.nodes.size(); i++) {
-        const double r = rule.nodes[i], shell = 4 * M_PI * r * r * rule.weights[i];
-        const PairScalars real = realScalars(r);
-        random += shell * (2 * real.F * real.F + real.G * real.G) / 3;
-        coherent += shell * std::fabs(2 * real.F + real.G) / 3;
-    }
+    const auto add = [&](double from, double to) {
+        if (from >= to)
+            return;
+        const Quadrature rule = gaussLegendre(64, from, to);
+        for (size_t i = 0; i < rule.nodes.size(); i++) {
+            const double r = rule.nodes[i], shell = 4 * M_PI * r * r * rule.weights[i];
+            const PairScalars real = realScalars(r);
+            random += shell * (2 * real.F * real.F + real.G * real.G) / 3;
+            coherent += shell * std::fabs(2 * real.F + real.G) / 3;
+        }
+    };
+    add(std::max(rc, CONTACT), R);
+    add(std::max(rc, R), maxDistance()); // the tail of force coupling
     const double alike = 3 * meanPhi / (4 * M_PI) * coherent;
     return std::sqrt(3 * phi / (4 * M_PI) * random + alike * alike);
 }

@@ -7,7 +7,7 @@
 namespace PSE::numerics {
 
 PairScalars Split::realScalars(double r) const {
-    const PairScalars total = rpyScalars(r);
+    const PairScalars total = totalScalars(sphereModel, r);
     const SmoothScalars wave = waveScalars(r);
     return {total.F - wave.F, total.G - wave.F - wave.C * r * r};
 }
@@ -23,6 +23,17 @@ Split::DroppedWaves Split::integrateWaves(double from, double to,
         sum.self += half * rule.weights[i] * share(k) * w;
     }
     return sum;
+}
+
+Split::DroppedWaves Split::integrateOutside(const std::array<double, 3>& faces, double to) const {
+    // of a shell of radius k, the two caps beyond a pair of faces at f are 1 - f/k
+    const auto share = [&](double k) {
+        double outside = 0;
+        for (double face : faces)
+            outside += std::max(0.0, 1 - face / k);
+        return std::min(1.0, outside);
+    };
+    return integrateWaves(*std::min_element(faces.begin(), faces.end()), to, share);
 }
 
 Split::DroppedWaves Split::droppedWaves(const std::array<double, 3>& faces) const {

@@ -4,15 +4,17 @@
 
 // The positive split of the mobility, M = M_W + M_R [T4, T5]:
 //
-//     M_W(k) = 1/(eta V k^2) w(k) (I - kk),    0 <= w(k) <= sinc^2(k a)
+//     M_W(k) = 1/(eta V k^2) w(k) (I - kk),    0 <= w(k) <= t(k)
 //
-// A split is its wave weight w. What is left for real space is M_R = RPY - (integral of M_W over
-// all k), for every distance, overlaps included.
+// A split is its wave weight w; t is that of the whole mobility, sinc^2(k a) for
+// Rotne-Prager-Yamakawa [T2] and exp(-k^2 a^2/pi) for force coupling [T41]. What is left for real
+// space is M_R = M - (integral of M_W over all k), for every distance, overlaps included.
 //
 // Everything here is in reduced units: lengths in radii a, wave numbers in 1/a, mobilities in 1/(6
 // pi eta a).
 
 #include "numerics/Rpy.h"
+#include "numerics/SphereModel.h"
 #include <array>
 #include <functional>
 #include <string>
@@ -24,8 +26,11 @@ constexpr double CONTACT = 2;
 
 class Split {
 public:
+    explicit Split(SphereModel model = SphereModel::RotnePragerYamakawa) : sphereModel(model) {}
     virtual ~Split() = default;
     virtual std::string name() const = 0;
+    /** What is divided. */
+    SphereModel model() const { return sphereModel; }
     /** Wave weight w(k) for k >= 0. */
     virtual double waveWeight(double k) const = 0;
     /**
@@ -41,7 +46,7 @@ public:
      */
     virtual double tableRange(bool single) const = 0;
 
-    /** Real part of the pair tensor, RPY minus wave part [T7], for 0 <= r <= maxDistance(). */
+    /** Real part of the pair tensor, total minus wave part [T7], for 0 <= r <= maxDistance(). */
     PairScalars realScalars(double r) const;
     /** Real part of the self mobility, 1 - F_W(0) [T7]. */
     double realSelf() const { return 1 - waveScalars(0).F; }
@@ -93,9 +98,13 @@ protected:
     DroppedWaves integrateWaves(
         double from, double to,
         const std::function<double(double)>& share = [](double) { return 1.0; }) const;
+    /** Of all that lies outside a cell, up to a wave number beyond its nearest face. */
+    DroppedWaves integrateOutside(const std::array<double, 3>& faces, double to) const;
 
 private:
     double errorOf(const DroppedWaves& dropped, double phi) const;
+
+    SphereModel sphereModel;
 };
 
 } // namespace PSE::numerics

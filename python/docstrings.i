@@ -170,7 +170,8 @@ openmm.OpenMMException
 PSE_GETTER_DOC(getMobilityModel, int, Get the mobility model.,
     RotnePragerYamakawa or ForceCoupling or FreeDraining)
 PSE_SETTER_DOC(setMobilityModel, model, int, Set the mobility model. Default RotnePragerYamakawa.,
-    PSEBrownianIntegrator.RotnePragerYamakawa or .ForceCoupling or .FreeDraining (no hydrodynamics),
+    PSEBrownianIntegrator.RotnePragerYamakawa or .ForceCoupling (Gaussian envelopes of width
+    a/sqrt(pi); one radius for all) or .FreeDraining (no hydrodynamics),
     if it is none of these or a Context exists)
 PSE_GETTER_DOC(getFluidBoundary, int, Get what surrounds the particles.,
     Automatic or Periodic or Unbounded)
@@ -179,18 +180,19 @@ PSE_SETTER_DOC(setFluidBoundary, boundary, int,
     PSEBrownianIntegrator.Automatic (periodic if any Force is; else unbounded) or .Periodic or
     .Unbounded (infinite solvent by sums over all pairs; no box),
     if it is none of these or a Context exists)
-PSE_GETTER_DOC(getSplit, int, Get how M is divided., AutomaticSplit or Prolate or Hasimoto)
+PSE_GETTER_DOC(getSplit, int, Get how M is divided., AutomaticSplit or Prolate or Hasimoto or AllWaves)
 PSE_SETTER_DOC(setSplit, split, int,
     Set how M is divided into its real-space and wave-space half. Default AutomaticSplit.,
     PSEBrownianIntegrator.AutomaticSplit (Prolate where it is valid and not dearer) or .Prolate (real
     half exactly zero beyond its range; needs a range of 2.4 radii and more within half the box) or
-    .Hasimoto (the published one; any box), if it is none of these or a Context exists)
+    .Hasimoto (the published one; any box; not for ForceCoupling) or .AllWaves (no real half at all; for
+    ForceCoupling alone; any box), if it is none of these or a Context exists)
 PSE_GETTER_DOC(getSplittingParameter, Quantity, Get the requested splitting parameter.,
     xi (in 1/nm); 0 means automatic)
 PSE_SETTER_DOC(setSplittingParameter, xi, Quantity or float,
     Set the splitting parameter: it moves cost between the halves of M and leaves the result.,
     xi (in 1/nm) > 0 or 0 for automatic. For Prolate it is 1/range; AutomaticSplit takes it as 1/range
-    where that is valid and else as that of Hasimoto, if it is negative or not finite or a Context exists)
+    where that is valid and else as that of Hasimoto (ForceCoupling: always as 1/range), if it is negative or not finite or a Context exists)
 PSE_GETTER_DOC(getGridDimensions, tuple of int, Get the requested grid.,
     points along the three box vectors; (0 0 0) means automatic)
 PSE_GETTER_DOC(getWindowSupport, int, Get the requested window support.,
@@ -269,8 +271,8 @@ Get the numerical parameters that the Context really uses.
 Returns
 -------
 dict
-    split ("Prolate" or "Hasimoto" or "none"), xi (in 1/nm; Prolate: 1/realCutoff), realCutoff (in
-    nm), prolateBandwidth (0 for another split), gridDimensions (tuple of three int),
+    split ("Prolate" or "Hasimoto" or "AllWaves" or "none"), xi (in 1/nm; Prolate: 1/realCutoff),
+    realCutoff (in nm; 0 for AllWaves, which has no real half), prolateBandwidth (0 for another split), gridDimensions (tuple of three int),
     windowSupport, windowShape, lanczosTolerance, lanczosIterations (of the last thermal step),
     predictedError (of M f, relative to |f/(6 pi eta a)|), precision ("single" or "double"),
     randomSeed (the one in use). Plain numbers; without hydrodynamic interaction xi is 0 and

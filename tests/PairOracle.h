@@ -3,8 +3,9 @@
 #define OPENMMPSE_TESTS_PAIRORACLE_H_
 
 // Pair scalars as integrals over wave numbers in extended precision, by a rule and Bessel functions
-// of their own.
+// of their own; periodic pair tensors by plain lattice sums. Lengths in radii.
 
+#include "numerics/Lattice.h"
 #include "numerics/Split.h"
 #include <cmath>
 
@@ -53,6 +54,35 @@ SmoothScalars scalarsByTrapezium(const Weight& weight, long double reach, long d
         C += w * k * k * j2x2;
     }
     return {double(3 / pi * step * F), double(3 / pi * step * C)};
+}
+
+/** Of a pair at d. */
+inline Matrix3 tensor(const PairScalars& s, const Vec3& d) {
+    const double r2 = d.squaredNorm();
+    return s.F * Matrix3::Identity() +
+           (r2 > 0 ? Matrix3((s.G - s.F) / r2 * d * d.transpose()) : Matrix3::Zero());
+}
+
+/** The periodic pair tensor by its two lattice sums: pairs within `range`, waves within `kMax`. */
+inline Matrix3 periodicTensor(const Split& split, double range, double kMax, const Lattice& box,
+                              const Vec3& d) {
+    Matrix3 sum = Matrix3::Zero();
+    for (const Vec3& image : box.imagesWithin(range))
+        if ((d + image).norm() <= range)
+            sum += tensor(split.realScalars((d + image).norm()), d + image);
+    int limit[3];
+    for (int i = 0; i < 3; i++)
+        limit[i] = static_cast<int>(kMax * box.length(i) / (2 * M_PI)) + 1;
+    for (int i = -limit[0]; i <= limit[0]; i++)
+        for (int j = -limit[1]; j <= limit[1]; j++)
+            for (int l = -limit[2]; l <= limit[2]; l++) {
+                const Vec3 k = box.waveVectors() * Vec3(i, j, l);
+                const double k2 = k.squaredNorm();
+                if (k2 > 0 && k2 < kMax * kMax)
+                    sum += 6 * M_PI / box.volume() * split.waveWeight(std::sqrt(k2)) / k2 *
+                           std::cos(k.dot(d)) * (Matrix3::Identity() - k * k.transpose() / k2);
+            }
+    return sum;
 }
 
 } // namespace PSE::numerics

@@ -3,7 +3,6 @@
 // lattice sums.
 
 #include "PairOracle.h"
-#include "numerics/Lattice.h"
 #include "numerics/RealTable.h"
 #include "numerics/HasimotoSplit.h"
 #include <Eigen/Eigenvalues>
@@ -64,32 +63,9 @@ PairScalars closedForm(double xiDouble, double rDouble) {
     return {double(F), double(G)};
 }
 
-Matrix3 tensor(const PairScalars& s, const Vec3& d) {
-    const double r2 = d.squaredNorm();
-    return s.F * Matrix3::Identity() +
-           (r2 > 0 ? Matrix3((s.G - s.F) / r2 * d * d.transpose()) : Matrix3::Zero());
-}
-
-/** The periodic pair tensor by its two lattice sums, lengths in radii; error below 1e-13. */
+/** The periodic pair tensor by its two lattice sums; error below 1e-13. */
 Matrix3 periodicTensor(const HasimotoSplit& split, double xi, const Lattice& box, const Vec3& d) {
-    Matrix3 sum = Matrix3::Zero();
-    const double range = std::min(2 + 6.5 / xi, split.maxDistance());
-    for (const Vec3& image : box.imagesWithin(range))
-        if ((d + image).norm() <= range)
-            sum += tensor(split.realScalars((d + image).norm()), d + image);
-    int limit[3];
-    for (int i = 0; i < 3; i++)
-        limit[i] = static_cast<int>(12.5 * xi * box.length(i) / (2 * M_PI)) + 1;
-    for (int i = -limit[0]; i <= limit[0]; i++)
-        for (int j = -limit[1]; j <= limit[1]; j++)
-            for (int l = -limit[2]; l <= limit[2]; l++) {
-                const Vec3 k = box.waveVectors() * Vec3(i, j, l);
-                const double k2 = k.squaredNorm();
-                if (k2 > 0 && k2 < 156 * xi * xi)
-                    sum += 6 * M_PI / box.volume() * split.waveWeight(std::sqrt(k2)) / k2 *
-                           std::cos(k.dot(d)) * (Matrix3::Identity() - k * k.transpose() / k2);
-            }
-    return sum;
+    return periodicTensor(split, std::min(2 + 6.5 / xi, split.maxDistance()), 12.5 * xi, box, d);
 }
 
 double maximum(double a, double b, double c) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The prolate split against quadrature, finite differences, and the other split.
 
+#include "PairOracle.h"
 #include "numerics/HasimotoSplit.h"
-#include "numerics/Lattice.h"
 #include "numerics/ProlateSplit.h"
 #include "numerics/Quadrature.h"
 #include "numerics/RealTable.h"
@@ -68,34 +68,6 @@ Quadrature composite(double from, double to, int pieces, int nodes) {
 double sincSquare(double k) {
     const double sinc = (k == 0 ? 1 : std::sin(k) / k);
     return sinc * sinc;
-}
-
-Matrix3 tensor(const PairScalars& s, const Vec3& d) {
-    const double r2 = d.squaredNorm();
-    return s.F * Matrix3::Identity() +
-           (r2 > 0 ? Matrix3((s.G - s.F) / r2 * d * d.transpose()) : Matrix3::Zero());
-}
-
-/** The periodic pair tensor by its two lattice sums: pairs within `range`, waves within `kMax`. */
-Matrix3 periodicTensor(const Split& split, double range, double kMax, const Lattice& box,
-                       const Vec3& d) {
-    Matrix3 sum = Matrix3::Zero();
-    for (const Vec3& image : box.imagesWithin(range))
-        if ((d + image).norm() <= range)
-            sum += tensor(split.realScalars((d + image).norm()), d + image);
-    int limit[3];
-    for (int i = 0; i < 3; i++)
-        limit[i] = static_cast<int>(kMax * box.length(i) / (2 * M_PI)) + 1;
-    for (int i = -limit[0]; i <= limit[0]; i++)
-        for (int j = -limit[1]; j <= limit[1]; j++)
-            for (int l = -limit[2]; l <= limit[2]; l++) {
-                const Vec3 k = box.waveVectors() * Vec3(i, j, l);
-                const double k2 = k.squaredNorm();
-                if (k2 > 0 && k2 < kMax * kMax)
-                    sum += 6 * M_PI / box.volume() * split.waveWeight(std::sqrt(k2)) / k2 *
-                           std::cos(k.dot(d)) * (Matrix3::Identity() - k * k.transpose() / k2);
-            }
-    return sum;
 }
 
 } // namespace

@@ -212,11 +212,14 @@ def addConstraint(system):
 
 @pytest.mark.parametrize("configure, words", [
     (lambda i: i.setParticleRadius(3, 0.7),
-     ["setParticleRadius", "particle 3", "0.7", "0.5", "FreeDraining"]),
-    (lambda i: i.setMobilityModel(PSEBrownianIntegrator.ForceCoupling),
-     ["setMobilityModel", "ForceCoupling", "RotnePragerYamakawa"])])
-def testSettingsOfLaterVersions(platformName, configure, words):
-    assertMentions(refusal(platformName, configure), "PSEBrownianIntegrator", *words)
+     ["setParticleRadius", "particle 3", "0.7", "0.5", "RotnePragerYamakawa"]),
+    (lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Unbounded),
+     ["ForceCoupling", "unbounded", "RotnePragerYamakawa", "Periodic"])])
+def testForceCouplingWhereItIsNotAvailable(platformName, configure, words):
+    def forceCoupling(integrator):
+        integrator.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)
+        configure(integrator)
+    assertMentions(refusal(platformName, forceCoupling), "PSEBrownianIntegrator", *words)
 
 
 @pytest.mark.hostOnly

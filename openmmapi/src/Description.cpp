@@ -34,9 +34,10 @@ void describeFluid(std::ostream& out, const PSEBrownianIntegrator& integrator, d
 }
 
 void describeGrid(std::ostream& out, const NumericalParameters& p) {
-    out << ", xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm, grid "
-        << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x " << p.gridDimensions[2]
-        << ", window support " << p.windowSupport;
+    if (p.realCutoff > 0)
+        out << ", xi = " << p.xi << " /nm, real-space cutoff " << p.realCutoff << " nm";
+    out << ", grid " << p.gridDimensions[0] << " x " << p.gridDimensions[1] << " x "
+        << p.gridDimensions[2] << ", window support " << p.windowSupport;
 }
 
 void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator,
@@ -47,14 +48,15 @@ void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator
         describeGrid(out, p);
     else
         out << ", direct sums over all pairs";
-    out << ", Lanczos tolerance " << p.lanczosTolerance << ", " << p.precision << " precision"
-        << endl;
+    if (p.lanczosTolerance > 0)
+        out << ", Lanczos tolerance " << p.lanczosTolerance;
+    out << ", " << p.precision << " precision" << endl;
 }
 
 void describeSplit(std::ostream& out, const NumericalParameters& p) {
     const bool clause = p.splitReason.rfind("because", 0) == 0;
-    out << "split: " << p.split << " split" << (clause ? ", " : " (") << p.splitReason
-        << (clause ? "" : ")");
+    out << "split: " << (p.realCutoff > 0 ? p.split + " split" : "none, all by waves (AllWaves)")
+        << (clause ? ", " : " (") << p.splitReason << (clause ? "" : ")");
     if (p.prolateBandwidth > 0)
         out << ", range 1/xi = " << 1 / p.xi << " nm, bandwidth " << p.prolateBandwidth;
     out << endl;

@@ -166,7 +166,7 @@ void PSEBrownianIntegrator::setShearProtocol(ShearProtocol protocol, double time
 
 void PSEBrownianIntegrator::setSplit(Split value) {
     requireUnbound("setSplit");
-    requireInRange("split", value, AutomaticSplit, Hasimoto);
+    requireInRange("split", value, AutomaticSplit, AllWaves);
     split = value;
 }
 
@@ -213,9 +213,10 @@ void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& pa
     if (parameters.prolateBandwidth != 0)
         requireInRange("prolateBandwidth", parameters.prolateBandwidth, SMALLEST_BANDWIDTH,
                        LARGEST_BANDWIDTH);
-    if (parameters.prolateBandwidth != 0 && parameters.split == "Hasimoto")
-        refuse("prolateBandwidth is not 0, and split is 'Hasimoto', which has none; set it to 0, "
-               "or split to 'Prolate'");
+    if (parameters.prolateBandwidth != 0 &&
+        (parameters.split == "Hasimoto" || parameters.split == "AllWaves"))
+        refuse("prolateBandwidth is not 0, and split is '" + parameters.split +
+               "', which has none; set it to 0, or split to 'Prolate'");
     if (parameters.windowShape != 0)
         requirePositive("windowShape", parameters.windowShape, "");
     if (parameters.lanczosTolerance != 0)
@@ -224,9 +225,11 @@ void PSEBrownianIntegrator::setNumericalParameters(const NumericalParameters& pa
         split = Hasimoto;
     else if (parameters.split == "Prolate")
         split = Prolate;
+    else if (parameters.split == "AllWaves")
+        split = AllWaves;
     else if (parameters.split != "" && parameters.split != "none")
         refuse("split is '" + parameters.split +
-               "'; it must be 'Hasimoto', 'Prolate', 'none' or empty");
+               "'; it must be 'Prolate', 'Hasimoto', 'AllWaves', 'none' or empty");
     requested = trial.requested;
     requested.realCutoff = parameters.realCutoff;
     requested.prolateBandwidth = parameters.prolateBandwidth;

@@ -50,21 +50,11 @@ void checkSystem(const System& system, const PSEBrownianIntegrator& integrator) 
         }
 }
 
-void checkSettings(const PSEBrownianIntegrator& integrator) {
-    if (integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
-        refuse("setMobilityModel(ForceCoupling): this mobility is not available; use "
-               "RotnePragerYamakawa or FreeDraining");
-}
-
 void chooseBoundary(const System& system, const PSEBrownianIntegrator& integrator, Scene& scene) {
     const auto boundary = integrator.getFluidBoundary();
     const bool automatic = (boundary == PSEBrownianIntegrator::Automatic);
     const bool periodicForce = system.usesPeriodicBoundaryConditions();
     scene.unbounded = (automatic ? !periodicForce : boundary == PSEBrownianIntegrator::Unbounded);
-    if (scene.unbounded &&
-        integrator.getMobilityModel() == PSEBrownianIntegrator::ForceCoupling)
-        refuse("setMobilityModel(ForceCoupling): this mobility is not available in an unbounded "
-               "fluid; use RotnePragerYamakawa, or setFluidBoundary(Periodic)");
     if (!automatic)
         scene.boundaryReason = "as set by setFluidBoundary";
     else if (periodicForce)
@@ -80,6 +70,23 @@ bool equalRadii(const Scene& scene) {
     return true;
 }
 
+/** What force coupling cannot do yet where Rotne-Prager-Yamakawa can. */
+void checkForceCoupling(const Scene& scene) {
+    if (scene.unbounded)
+        refuse("setMobilityModel(ForceCoupling) in an unbounded fluid (" + scene.boundaryReason +
+               ") is not available; call setFluidBoundary(Periodic), or use RotnePragerYamakawa");
+    for (size_t i = 0; i < scene.radii.size(); i++)
+        if (scene.radii[i] != scene.radii[0]) {
+            std::ostringstream message;
+            message << "setParticleRadius: particle " << scene.mobile[i] << " has radius "
+                    << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has "
+                    << scene.radii[0] << " nm, and unequal radii are not available with "
+                    << "ForceCoupling in a periodic fluid; give all particles one radius, or use "
+                       "setMobilityModel(RotnePragerYamakawa)";
+            refuse(message.str());
+        }
+}
+
 } // namespace
 
 void requireShear(const Scene& scene) {
@@ -91,7 +98,6 @@ void requireShear(const Scene& scene) {
 
 Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
     checkSystem(system, integrator);
-    checkSettings(integrator);
     Scene scene;
     for (int i = 0; i < system.getNumForces(); i++)
         if (const char* name = nameOfBarostat(system.getForce(i)))
@@ -106,11 +112,15 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
         scene.mobile.push_back(i);
         scene.radii.push_back(integrator.getParticleRadius(i));
     }
-    scene.hydrodynamics =
-        (integrator.getMobilityModel() == PSEBrownianIntegrator::RotnePragerYamakawa);
+    const auto model = integrator.getMobilityModel();
+    scene.hydrodynamics = (model != PSEBrownianIntegrator::FreeDraining);
+    scene.forceCoupling = (model == PSEBrownianIntegrator::ForceCoupling);
     if (scene.hydrodynamics) {
         chooseBoundary(system, integrator, scene);
-        scene.modelReason = string("Rotne-Prager-Yamakawa, ") +
+        if (scene.forceCoupling)
+            checkForceCoupling(scene);
+        scene.modelReason = string(scene.forceCoupling ? "force coupling by Gaussian envelopes, "
+                                                       : "Rotne-Prager-Yamakawa, ") +
                             (equalRadii(scene) ? "equal radii" : "unequal radii");
     } else
         scene.modelReason = "setMobilityModel(FreeDraining) was called";

@@ -56,6 +56,8 @@ SplitChoice choiceOf(PSEBrownianIntegrator::Split split) {
         return SplitChoice::Prolate;
     case PSEBrownianIntegrator::Hasimoto:
         return SplitChoice::Hasimoto;
+    case PSEBrownianIntegrator::AllWaves:
+        return SplitChoice::AllWaves;
     default:
         return SplitChoice::Automatic;
     }
@@ -176,6 +178,8 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
                                   0, false, overrides, choiceOf(integrator.getSplit())});
     if (isMixture(scene.radii))
         request->radii = scene.radii;
+    if (scene.forceCoupling)
+        request->model = SphereModel::ForceCoupling;
     adapt(*request);
     const std::optional<Prepared> moving = prepareFor(box);
     use(moving ? *moving : prepared(*request), box);
@@ -329,7 +333,8 @@ string PlannedStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
     text.precision(17);
-    text << (scene.hydrodynamics ? "Rotne-Prager-Yamakawa" : "free draining")
+    const char* interacting = (scene.forceCoupling ? "force coupling" : "Rotne-Prager-Yamakawa");
+    text << (scene.hydrodynamics ? interacting : "free draining")
          << (scene.unbounded ? ", unbounded" : "") << ", viscosity " << viscosity << " Da/(nm ps), "
          << radiiInWords(scene.radii) << ", particles " << scene.mobile.size() << " of "
          << masses.size() << ", split " << p.split << ", xi " << p.xi << " /nm, real-space cutoff "

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "DeviceEngine.h"
 #include "DevicePrograms.h"
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 using namespace OpenMM;
 using namespace PSE::numerics;
@@ -102,19 +104,37 @@ std::shared_ptr<const SizeGroups> sizesOf(const Plan& plan) {
     return plan.mixture ? std::make_shared<const SizeGroups>(plan) : nullptr;
 }
 
+/**
+ * The range (nm) for which particles are sorted into cells: that of the real half, or without one
+ * the extent of the blocks of grid points for which waveSpace.cc collects particles.
+ */
+double cellRange(const Plan& plan, const Lattice& box) {
+    constexpr double BLOCK_POINTS = 8;
+    if (plan.hasRealHalf())
+        return plan.realCutoff;
+    double spacing = std::numeric_limits<double>::infinity();
+    for (int d = 0; d < 3; d++)
+        spacing = std::min(spacing, box.width(d) / plan.grid[d]);
+    return BLOCK_POINTS * spacing;
+}
+
 } // namespace
 
 DevicePeriodicEngine::DevicePeriodicEngine(DevicePrograms& programs, int particles,
                                            const std::vector<int>& mobile, const Plan& plan,
                                            const Lattice& box, double viscosity, StageClock& clock)
-    : DeviceEngine(programs, particles, mobile, box, plan.realCutoff,
+    : DeviceEngine(programs, particles, mobile, box, cellRange(plan, box),
                    1 / (6 * M_PI * viscosity * plan.a),
-                   DeviceLanczos::summaryRows(LanczosTridiagonal::REAL_HALF), clock, sizesOf(plan)),
+                   plan.hasRealHalf() ? DeviceLanczos::summaryRows(LanczosTridiagonal::REAL_HALF)
+                                      : 0,
+                   clock, sizesOf(plan)),
       drag(6 * M_PI * viscosity * plan.a),
       spheres(plan.mixture ? new DeviceSpheres(programs, plan, particles, mobile, places)
                            : nullptr),
-      realSpace(programs, plan, box, places, summary, spheres.get()),
-      waveSpace(programs, plan, box, places, spheres.get()) {}
+      waveSpace(programs, plan, box, places, spheres.get()) {
+    if (plan.hasRealHalf())
+        realSpace.emplace(programs, plan, box, places, summary, spheres.get());
+}
 
 void DevicePeriodicEngine::setPositions() {
     places.update();
@@ -122,20 +142,22 @@ void DevicePeriodicEngine::setPositions() {
         spheres->update();
     waveSpace.evaluateWindows();
     stages.charge("sorting of particles and window weights");
-    realSpace.findNeighbours();
-    stages.charge("neighbours");
+    if (realSpace) {
+        realSpace->findNeighbours();
+        stages.charge("neighbours");
+    }
 }
 
 /** Everything up to the one reading of the summary. */
 void DevicePeriodicEngine::launch(bool forced, const Thermal* thermal, double noise) {
-    if (forced) {
-        realSpace.multiply(forces, u);
+    if (forced && realSpace) {
+        realSpace->multiply(forces, u);
         stages.charge("real-space velocities");
     } else
         context.clearBuffer(u);
     int rows = 0;
-    if (noise > 0) {
-        rows = realSpace.squareRoot().start(thermal->real);
+    if (noise > 0 && realSpace) {
+        rows = realSpace->squareRoot().start(thermal->real);
         stages.charge("real-space noise (Lanczos)");
     }
     waveSpace.addVelocities(forced ? &forces : NULL, noise, noise > 0 ? thermal->wave : NoiseKey{},
@@ -148,12 +170,12 @@ void DevicePeriodicEngine::computeVelocities(bool forced, const Thermal* thermal
     const double noise =
         thermal == NULL ? 0 : std::sqrt(2 * thermal->kT * drag / thermal->dt); // a force
     launch(forced, thermal, noise);
-    while (!realSpace.hadRoom()) {
-        realSpace.findNeighbours();
+    while (realSpace && !realSpace->hadRoom()) {
+        realSpace->findNeighbours();
         launch(forced, thermal, noise);
     }
-    if (noise > 0) {
-        realSpace.squareRoot().add(noise, u);
+    if (noise > 0 && realSpace) {
+        realSpace->squareRoot().add(noise, u);
         stages.charge("real-space noise (Lanczos)");
     }
 }

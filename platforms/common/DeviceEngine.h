@@ -10,6 +10,7 @@
 #include "Thermal.h"
 #include "numerics/Vec3.h"
 #include <memory>
+#include <optional>
 #include <utility>
 
 namespace PSE {
@@ -88,14 +89,16 @@ public:
                          StageClock& clock);
     void setPositions() override;
     void computeVelocities(bool forced, const Thermal* thermal) override;
-    int lanczosIterations() const override { return realSpace.squareRoot().lastIterations(); }
+    int lanczosIterations() const override {
+        return realSpace ? realSpace->squareRoot().lastIterations() : 0;
+    }
 
 private:
     void launch(bool forced, const Thermal* thermal, double noise);
 
-    double drag;                            ///< 6 pi eta a
-    std::unique_ptr<DeviceSpheres> spheres; ///< of a mixture, else NULL
-    DeviceRealSpace realSpace;
+    double drag;                              ///< 6 pi eta a
+    std::unique_ptr<DeviceSpheres> spheres;   ///< of a mixture, else NULL
+    std::optional<DeviceRealSpace> realSpace; ///< none where waves are all there is
     DeviceWaveSpace waveSpace;
 };
 

@@ -86,6 +86,8 @@ ComputeProgram DeviceRealSpace::prepareRows(DevicePrograms& programs, const Plan
                     {"APART_G3", context.doubleToString(c::APART_G3)},
                     {"OVERLAP_F1", context.doubleToString(c::OVERLAP_F1)},
                     {"OVERLAP_G1", context.doubleToString(c::OVERLAP_G1)}});
+    if (!table.rpy)
+        defines["POLYNOMIALS_ALONE"] = "1";
     const ComputeProgram program = programs.realSpace(defines, constants);
     findKernel = DeviceKernel(context, program, "findNeighbours");
     return program;

@@ -29,13 +29,16 @@ CpuEngine<Real>::CpuEngine(const Plan& plan, const Lattice& box, double viscosit
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
       negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
       reorthogonalise(plan.precision == Precision::Double), indices(indices), box(box),
-      threads(pool, isSmall(plan, indices.size())), clock(clock), realSpace(plan, box, threads),
-      waveSpace(plan, box, threads) {}
+      threads(pool, isSmall(plan, indices.size())), clock(clock), waveSpace(plan, box, threads) {
+    if (plan.hasRealHalf())
+        realSpace.emplace(plan, box, threads);
+}
 
 template <class Real> void CpuEngine<Real>::setBox(const Lattice& moved) {
     clock.start();
     box = moved;
-    realSpace.setBox(moved);
+    if (realSpace)
+        realSpace->setBox(moved);
     waveSpace.setBox(moved);
     clock.charge(MOVING_BOX);
 }
@@ -47,9 +50,14 @@ template <class Real> void CpuEngine<Real>::setPositions(const std::vector<Vec3>
         for (int i = from; i < to; i++)
             fractions[i] = box.wrappedFractional(x[i]);
     };
-    placeParticles(threads, fractions, locate, realSpace, waveSpace);
+    if (!realSpace) {
+        placeParticles(threads, fractions, locate, waveSpace);
+        clock.charge("sorting of particles and window weights");
+        return;
+    }
+    placeParticles(threads, fractions, locate, *realSpace, waveSpace);
     clock.charge("sorting of particles and window weights");
-    realSpace.findNeighbours(fractions);
+    realSpace->findNeighbours(fractions);
     clock.charge("neighbours and pair coefficients");
 }
 
@@ -66,23 +74,34 @@ void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const T
     clock.start();
     const bool forced = scale.forced;
     const Real noise = Real(scale.noise);
-    if (forced) {
+    if (forced && realSpace) {
         multiplyReal(*forces, unit);
         clock.charge("real-space velocities");
-    }
-    if (noise > 0)
-        drawReal(*thermal);
-    writeReal(forced, noise, unit / drag, u);
-    clock.charge(noise > 0 ? "real-space noise (Lanczos)" : "real-space velocities");
+    } else if (forced)
+        takeForces(*forces, unit);
+    if (realSpace) {
+        if (noise > 0)
+            drawReal(*thermal);
+        writeReal(forced, noise, unit / drag, u);
+        clock.charge(noise > 0 ? "real-space noise (Lanczos)" : "real-space velocities");
+    } else
+        u.assign(indices.size(), Vec3::Zero());
     waveSpace.addVelocities(forced, noise, noise > 0 ? thermal->wave : NoiseKey{}, unit / drag, u,
                             clock);
+}
+
+/** The wave half alone takes its forces, in units of `unit`. */
+template <class Real>
+void CpuEngine<Real>::takeForces(const std::vector<Vec3>& forces, double unit) {
+    threads.runBlocks(static_cast<int>(indices.size()),
+                      [&](int from, int to, int) { waveSpace.takeForces(forces, unit, from, to); });
 }
 
 /** Both halves take their forces, in units of `unit`; realForced = M_R f. */
 template <class Real>
 void CpuEngine<Real>::multiplyReal(const std::vector<Vec3>& forces, double unit) {
-    const std::vector<int>& order = realSpace.order();
-    Vector& inPlaces = realSpace.basis(0); // free for this use until Lanczos begins
+    const std::vector<int>& order = realSpace->order();
+    Vector& inPlaces = realSpace->basis(0); // free for this use until Lanczos begins
     realForced.resize(inPlaces.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
@@ -90,13 +109,13 @@ void CpuEngine<Real>::multiplyReal(const std::vector<Vec3>& forces, double unit)
                 inPlaces[3 * size_t(place) + c] = Real(forces[order[place]][c] / unit);
         waveSpace.takeForces(forces, unit, from, to);
     });
-    realSpace.multiplyAdd(inPlaces, 1, inPlaces, 0, realForced);
+    realSpace->multiplyAdd(inPlaces, 1, inPlaces, 0, realForced);
 }
 
 /** realThermal = M_R^{1/2} z. */
 template <class Real> void CpuEngine<Real>::drawReal(const Thermal& thermal) {
-    const std::vector<int>& order = realSpace.order();
-    Vector& z = realSpace.basis(0);
+    const std::vector<int>& order = realSpace->order();
+    Vector& z = realSpace->basis(0);
     realThermal.resize(z.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         uint32_t particles[Threads::BLOCK]; // indices in the System
@@ -104,14 +123,14 @@ template <class Real> void CpuEngine<Real>::drawReal(const Thermal& thermal) {
             particles[place - from] = static_cast<uint32_t>(indices[order[place]]);
         noiseLoops.particleNoise(thermal.real, particles, to - from, z.data() + 3 * size_t(from));
     });
-    iterations = lanczosSquareRoot(realSpace, realThermal, lanczosTolerance, negativeTolerance,
+    iterations = lanczosSquareRoot(*realSpace, realThermal, lanczosTolerance, negativeTolerance,
                                    reorthogonalise);
 }
 
 /** u = unit (realForced + noise realThermal), from places to particles. */
 template <class Real>
 void CpuEngine<Real>::writeReal(bool forced, Real noise, double unit, std::vector<Vec3>& u) const {
-    const std::vector<int>& order = realSpace.order();
+    const std::vector<int>& order = realSpace->order();
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
             for (int c = 0; c < 3; c++) {

@@ -5,6 +5,7 @@
 #include "CpuRealSpace.h"
 #include "CpuWaveSpace.h"
 #include "MobilityEngine.h"
+#include <optional>
 
 namespace PSE {
 
@@ -25,6 +26,7 @@ public:
 
 private:
     using Vector = std::vector<Real>;
+    void takeForces(const std::vector<numerics::Vec3>& forces, double unit);
     void multiplyReal(const std::vector<numerics::Vec3>& forces, double unit);
     void drawReal(const Thermal& thermal);
     void writeReal(bool forced, Real noise, double unit, std::vector<numerics::Vec3>& u) const;
@@ -36,7 +38,7 @@ private:
     numerics::Lattice box;
     Threads threads;
     StageClock& clock;
-    CpuRealSpace<Real> realSpace;
+    std::optional<CpuRealSpace<Real>> realSpace; ///< none where waves are all there is
     CpuWaveSpace<Real> waveSpace;
     WaveKernels<Real> noiseLoops = waveKernels<Real>();
     std::vector<numerics::Vec3> fractions;

@@ -63,6 +63,7 @@ CpuRealSpace<Real>::CpuRealSpace(const Plan& plan, const Lattice& box, const Thr
     }
     const RealTable table = makeRealTable(*plan.split, range / a, plan.tableError);
     self = Real(table.self);
+    rpy = table.rpy;
     coefficientsF = hornerOrder<Real>(table.F);
     coefficientsC = hornerOrder<Real>(table.C);
 }
@@ -250,8 +251,12 @@ void CpuRealSpace<Real>::fillRowsWithImages(const std::vector<Vec3>& fractions) 
 }
 
 template <class Real> PairPolynomials<Real> CpuRealSpace<Real>::polynomials() const {
-    return {Real(range / a), int(coefficientsF.size()) - 1, int(coefficientsC.size()) - 1,
-            coefficientsF.data(), coefficientsC.data()};
+    return {rpy,
+            Real(range / a),
+            int(coefficientsF.size()) - 1,
+            int(coefficientsC.size()) - 1,
+            coefficientsF.data(),
+            coefficientsC.data()};
 }
 
 template <class Real> PairGeometry<Real> CpuRealSpace<Real>::geometry() const {

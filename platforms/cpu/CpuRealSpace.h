@@ -61,6 +61,7 @@ private:
     numerics::Lattice box;
     double a, range;
     bool sumImages, tilted;
+    bool rpy = true;                                ///< its branches are added to the polynomials
     double width[3];                                ///< distances between opposite faces of the box
     std::unique_ptr<CpuMixturePairs<Real>> mixture; ///< NULL for equal radii
     Real self = 0;                                  ///< of equal radii

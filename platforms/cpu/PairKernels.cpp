@@ -25,13 +25,38 @@ HWY_INLINE hn::Vec<D> polynomial(D d, const hn::TFromD<D>* coefficients, int deg
 
 constexpr double SMALLEST_R2 = 1e-30; ///< in radii
 
+/** F and C of RPY at r^2. */
+template <class D> struct RpyBranches {
+    hn::Vec<D> F, C;
+    HWY_INLINE RpyBranches(D d, hn::Vec<D> r2) {
+        using Rpy = numerics::RpyCoefficients;
+        const auto constant = [&](double value) { return hn::Set(d, hn::TFromD<D>(value)); };
+        const auto one = constant(1), zero = hn::Zero(d);
+        const auto r = hn::Sqrt(r2), s = hn::Div(one, r), s2 = hn::Mul(s, s);
+        // Both regimes, then a choice. At r = 0 the one that is not chosen is infinite, and C
+        // counts for nothing; so it does wherever 1/r^2 could overflow.
+        const auto overlap = hn::Lt(r, constant(Rpy::CONTACT));
+        F = hn::IfThenElse(
+            overlap, hn::MulAdd(constant(Rpy::OVERLAP_F1), r, one),
+            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_F3), s2, constant(Rpy::APART_F1))));
+        const auto G = hn::IfThenElse(
+            overlap, hn::MulAdd(constant(Rpy::OVERLAP_G1), r, one),
+            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_G3), s2, constant(Rpy::APART_G1))));
+        C = hn::IfThenElse(hn::Gt(r2, constant(SMALLEST_R2)), hn::Mul(hn::Sub(G, F), s2), zero);
+    }
+};
+/** Nothing beside the polynomials. */
+template <class D> struct NoBranches {
+    hn::Vec<D> F, C;
+    HWY_INLINE NoBranches(D d, hn::Vec<D>) : F(hn::Zero(d)), C(hn::Zero(d)) {}
+};
+
 /** F and C of one block from its displacements; lanes from `used` on count for nothing. */
-template <class Real>
+template <template <class> class Branches, class Real>
 HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, PairBlock<Real>& p) {
-    using Rpy = numerics::RpyCoefficients;
     const hn::CappedTag<Real, PAIR_LANES> d;
     const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
-    const auto one = constant(1), zero = hn::Zero(d);
+    const auto one = constant(1);
     for (int k = 0; k < PAIR_LANES; k += static_cast<int>(hn::Lanes(d))) {
         const auto dx = hn::LoadU(d, p.dx + k), dy = hn::LoadU(d, p.dy + k),
                    dz = hn::LoadU(d, p.dz + k);
@@ -39,41 +64,42 @@ HWY_INLINE void evaluateBlock(const PairPolynomials<Real>& table, int used, Pair
         const auto t = hn::MulSub(constant(2 / (double(table.rc) * table.rc)), r2, one);
         const auto waveF = polynomial(d, table.F, table.degreeF, t),
                    waveC = polynomial(d, table.C, table.degreeC, t);
-        const auto r = hn::Sqrt(r2), s = hn::Div(one, r), s2 = hn::Mul(s, s);
-        // Both regimes, then a choice. At r = 0 the one that is not chosen is infinite, and C
-        // counts for nothing; so it does wherever 1/r^2 could overflow.
-        const auto overlap = hn::Lt(r, constant(Rpy::CONTACT));
-        const auto F = hn::IfThenElse(
-            overlap, hn::MulAdd(constant(Rpy::OVERLAP_F1), r, one),
-            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_F3), s2, constant(Rpy::APART_F1))));
-        const auto G = hn::IfThenElse(
-            overlap, hn::MulAdd(constant(Rpy::OVERLAP_G1), r, one),
-            hn::Mul(s, hn::MulAdd(constant(Rpy::APART_G3), s2, constant(Rpy::APART_G1))));
-        const auto C =
-            hn::IfThenElse(hn::Gt(r2, constant(SMALLEST_R2)), hn::Mul(hn::Sub(G, F), s2), zero);
+        const Branches<decltype(d)> whole(d, r2);
         const int left = used - k; // in these lanes
         const auto inUse = hn::FirstN(d, left > 0 ? size_t(left) : 0);
-        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(F, waveF)), d, p.F + k);
-        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(C, waveC)), d, p.C + k);
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(whole.F, waveF)), d, p.F + k);
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(whole.C, waveC)), d, p.C + k);
     }
 }
 
 template <class Real>
 void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last,
                        PairBlock<Real>* blocks) {
-    for (int b = 0; b < count; b++)
-        evaluateBlock(table, b == count - 1 ? last : PAIR_LANES, blocks[b]);
+    for (int b = 0; b < count; b++) {
+        const int used = (b == count - 1 ? last : PAIR_LANES);
+        if (table.rpy)
+            evaluateBlock<RpyBranches>(table, used, blocks[b]);
+        else
+            evaluateBlock<NoBranches>(table, used, blocks[b]);
+    }
+}
+
+template <template <class> class Branches, class Real>
+int fillRowOf(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
+              const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
+    const Real range2 = geometry.range * geometry.range;
+    return fillRowWith(
+        geometry, i, [&](auto d, int) HWY_ATTR { return hn::Set(d, range2); },
+        [&](const int32_t*, int used, PairBlock<Real>& block)
+            HWY_ATTR { evaluateBlock<Branches>(table, used, block); },
+        runs, numRuns, found, row);
 }
 
 template <class Real>
 int fillRowAny(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
                const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
-    const Real range2 = geometry.range * geometry.range;
-    return fillRowWith(
-        geometry, i, [&](auto d, int) HWY_ATTR { return hn::Set(d, range2); },
-        [&](const int32_t*, int used, PairBlock<Real>& block)
-            HWY_ATTR { evaluateBlock(table, used, block); },
-        runs, numRuns, found, row);
+    return table.rpy ? fillRowOf<RpyBranches>(geometry, table, i, runs, numRuns, found, row)
+                     : fillRowOf<NoBranches>(geometry, table, i, runs, numRuns, found, row);
 }
 
 /** Sum of v w, accumulated in double. */

@@ -55,6 +55,7 @@ template <class Real> struct PairRows {
  * in radii.
  */
 template <class Real> struct PairPolynomials {
+    bool rpy; ///< with the branches of RPY; else the polynomials alone
     Real rc;
     int degreeF, degreeC;
     const Real *F, *C;

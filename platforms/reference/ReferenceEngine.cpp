@@ -16,7 +16,8 @@ ReferenceEngine::ReferenceEngine(const Plan& plan, const Lattice& box, double vi
                                  const std::vector<int>& indices, StageClock& clock)
     : plan(plan), box(box), viscosity(viscosity), selfMobility(1 / (6 * M_PI * viscosity * plan.a)),
       indices(indices), clock(clock) {
-    prepareRealHalf();
+    if (plan.hasRealHalf())
+        prepareRealHalf();
     listModes();
 }
 
@@ -68,7 +69,7 @@ void ReferenceEngine::setPositions(const std::vector<Vec3>& x) {
     pairs.clear();
     if (plan.sumImages)
         listImages();
-    else
+    else if (plan.hasRealHalf())
         listNeighbours();
     preparePhases();
     clock.charge("neighbour list");
@@ -193,8 +194,10 @@ void ReferenceEngine::addWaves(const Vectors* forces, const Thermal* thermal, Ve
 void ReferenceEngine::computeVelocities(const Vectors* forces, const Thermal* thermal, Vectors& u) {
     u.assign(positions.size(), Vec3::Zero());
     clock.start();
-    addReal(forces, thermal, u);
-    clock.charge("real space");
+    if (plan.hasRealHalf()) {
+        addReal(forces, thermal, u);
+        clock.charge("real space");
+    }
     addWaves(forces, thermal, u);
     clock.charge("wave space");
 }

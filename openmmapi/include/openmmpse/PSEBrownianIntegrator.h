@@ -21,12 +21,14 @@ struct Scene;
  * For a free-draining or unbounded fluid xi = 0 and the grid is (0, 0, 0).
  */
 struct OPENMM_EXPORT_PSE NumericalParameters {
-    /// name of the real/wave split: "Prolate" or "Hasimoto", or "none" without one
+    /// name of the real/wave split: "Prolate", "Hasimoto" or "AllWaves", or "none" without waves
     std::string split;
     /// splitting parameter (in 1/nm); of the prolate split 1/realCutoff, of unequal spheres 1 over
     /// what is left of it without the two largest radii
     double xi = 0;
-    double realCutoff = 0; ///< range of the real-space half (in nm), of unequal spheres the largest
+    /// range of the real-space half (in nm), of unequal spheres the largest; 0 without that half
+    /// (AllWaves)
+    double realCutoff = 0;
     /// bandwidth c of the prolate split, in [3, 30] (dimensionless); 0 for another split
     double prolateBandwidth = 0;
     int gridDimensions[3] = {0, 0, 0}; ///< grid points along the three box vectors
@@ -50,12 +52,13 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
  *
  *     dx = M(x) f dt + sqrt(2 kT M(x)) dW                       [T1]
  *
- * M is the Rotne-Prager-Yamakawa mobility of a periodic fluid, evaluated by Positively Split
- * Ewald (Fiore, Balboa Usabiaga, Donev, Swan, J. Chem. Phys. 146, 124116 (2017)) at a cost linear
- * in the number of particles. Its divergence vanishes, so the Euler-Maruyama step used here has no
- * drift term; it is of weak order 1 in the step size: halve the step to check a result. Masses do
- * not enter the motion, except that massless particles do not move and are transparent to the
- * fluid. Velocities reported by the Context are displacement / step size.
+ * M is the Rotne-Prager-Yamakawa mobility (or another MobilityModel) of a periodic fluid,
+ * evaluated by Positively Split Ewald (Fiore, Balboa Usabiaga, Donev, Swan, J. Chem. Phys. 146,
+ * 124116 (2017)) at a cost linear in the number of particles. Its divergence vanishes, so the
+ * Euler-Maruyama step used here has no drift term; it is of weak order 1 in the step size: halve
+ * the step to check a result. Masses do not enter the motion, except that massless particles do not
+ * move and are transparent to the fluid. Velocities reported by the Context are displacement / step
+ * size.
  *
  * Temperature, step size and shear rate take effect at the next step. Everything else is fixed when
  * a Context is created; setting it later raises an exception.
@@ -66,8 +69,10 @@ public:
     enum MobilityModel : int {
         /// rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
         RotnePragerYamakawa = 0,
-        ForceCoupling = 1, ///< Gaussian envelopes, sigma = a/sqrt(pi)
-        FreeDraining = 2   ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
+        /// the fluctuating force-coupling method: Gaussian envelopes, sigma = a/sqrt(pi), smooth at
+        /// every distance; one radius for all particles
+        ForceCoupling = 1,
+        FreeDraining = 2 ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
     };
     /** What surrounds the particles. */
     enum FluidBoundary : int {
@@ -80,13 +85,16 @@ public:
     };
     /** How M is divided into a real-space and a wave-space half; none of them shows in M. */
     enum Split : int {
-        /// Prolate where the box and the tolerance allow it and Hasimoto is not cheaper by the cost
-        /// model
+        /// Prolate where the box and the tolerance allow it and Hasimoto (for ForceCoupling:
+        /// AllWaves) is not cheaper by the cost model
         AutomaticSplit = 0,
         /// the real half is exactly zero beyond its range R; needs R between 2.4 radii (more for
         /// tolerances below 1e-2) and half the smallest width of the box
         Prolate = 1,
-        Hasimoto = 2 ///< the published one, for every box
+        Hasimoto = 2, ///< the published one, for every box; not for ForceCoupling
+        /// no split at all: ForceCoupling by waves alone, for every box; neither neighbours nor
+        /// Lanczos iterations
+        AllWaves = 3
     };
     /** How the shear rate depends on the time t of the Context. */
     enum ShearProtocol : int {
@@ -187,7 +195,7 @@ public:
      * Set the splitting parameter xi (in 1/nm), > 0, or 0 for automatic. It moves cost between the
      * halves, not the result. Its meaning is the split's: for Prolate it is 1/range, for Hasimoto
      * that of the published formula. AutomaticSplit takes it as 1/range where that is a valid range
-     * of Prolate, else as Hasimoto's.
+     * of Prolate, else as Hasimoto's; with ForceCoupling it is always 1/range.
      */
     void setSplittingParameter(double xi);
     /** Get the requested grid dimensions; 0 = automatic. */

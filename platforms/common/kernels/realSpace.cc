@@ -2,7 +2,8 @@
 // The real-space half: M_R = F (I - rr) + G rr as F I + C d d^T, from rows of neighbours [T7]; what
 // follows, lanczos.cc, draws its square root. Lengths in radii, mobilities in 1/(6 pi eta a).
 // A thread owns a row and adds its neighbours in their order: no sum is shared between threads.
-// DEGREE_F and DEGREE_C are numbers, or entries of `plan` (PlanConstants).
+// DEGREE_F and DEGREE_C are numbers, or entries of `plan` (PlanConstants). POLYNOMIALS_ALONE: without
+// the branches of RPY.
 
 #ifndef MIXTURE // else sphereRows.cc
 // further places in the array of geometry
@@ -78,12 +79,15 @@ DEVICE real polynomial(GLOBAL const real* RESTRICT coefficients, int degree, rea
 
 /**
  * F and C of a pair.
- * @param tables  polynomials of the wave part, F's [DEGREE_F+1] and C's [DEGREE_C+1], highest power
+ * @param tables  polynomials to be subtracted (RealTable), F's [DEGREE_F+1] and C's [DEGREE_C+1], highest power
  * first
  */
 DEVICE real2 pairScalars(real r2, GLOBAL const int* RESTRICT plan, GLOBAL const real* RESTRICT geometry, GLOBAL const real* RESTRICT tables) {
     const real t = geometry[SCALE]*r2-1;
     const real waveF = polynomial(tables, DEGREE_F, t), waveC = polynomial(tables+DEGREE_F+1, DEGREE_C, t);
+#ifdef POLYNOMIALS_ALONE
+    return make_real2(-waveF, -waveC);
+#else
     // C counts for nothing where 1/r^2 could overflow
     if (r2 < (real) SMALLEST_R2)
         return make_real2(1-waveF, 0);
@@ -98,6 +102,7 @@ DEVICE real2 pairScalars(real r2, GLOBAL const int* RESTRICT plan, GLOBAL const 
         G = s*((real) APART_G1+(real) APART_G3*s*s);
     }
     return make_real2(F-waveF, (G-F)*s*s-waveC);
+#endif
 }
 
 /** Row i of M_R times v. */

@@ -63,11 +63,11 @@ private:
     std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box,
                                          double viscosity, const std::vector<int>& indices,
                                          StageClock& clock) const {
+        const double real = plan.hasRealHalf() ? CpuRealSpace<Real>::bytesPerParticle(plan) : 0;
         requireMemory(plan, box, indices.size(),
                       {CpuWaveSpace<Real>::bytesPerGridPoint(plan, box),
                        CpuRealSpace<Real>::BYTES_PER_PAIR,
-                       CpuRealSpace<Real>::bytesPerParticle(plan) +
-                           CpuWaveSpace<Real>::bytesPerParticle(plan)});
+                       real + CpuWaveSpace<Real>::bytesPerParticle(plan)});
         return std::unique_ptr<MobilityEngine>(
             new CpuEngine<Real>(plan, box, viscosity, indices, pool, clock));
     }

@@ -22,6 +22,7 @@ struct OPENMM_EXPORT_PSE Scene {
     /// Forces or fluid see images of the particles: shear tilts the box
     bool periodicBox = false;
     std::string barostat; ///< the kind of Force that moves the box; empty: none
+    bool forceCoupling = false; ///< by Gaussian envelopes instead of rigid spheres' surfaces
     std::string modelReason, boundaryReason;
 };
 
