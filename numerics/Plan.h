@@ -85,8 +85,8 @@ struct Plan {
     double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
     Precision precision;
     /// made for a box that moves: wave factors are made anew, fast, for each shape of it
-    bool moving;
-    double shortest; ///< PlanRequest::shortest
+    bool moving = false;
+    double shortest = 1; ///< PlanRequest::shortest
 
     /** Of the split, whichever there is. */
     std::string splitName() const { return mixture ? mixture->name() : split->name(); }
