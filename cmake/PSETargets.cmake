@@ -94,8 +94,9 @@ function(pse_python_module name interface)
     add_custom_command(OUTPUT ${wrapper} ${folder}/${name}.py
         COMMAND ${SWIG_EXECUTABLE} -python -c++ -doxygen -w314,325,453
             -outdir ${folder} -o ${wrapper}
-            -I${OPENMM_DIR}/include -I${CMAKE_CURRENT_SOURCE_DIR}/openmmapi/include
-            -I${CMAKE_CURRENT_SOURCE_DIR}/python ${CMAKE_CURRENT_SOURCE_DIR}/${interface}
+            # Ours first: an installed copy lies beside OpenMM's headers.
+            -I${CMAKE_CURRENT_SOURCE_DIR}/openmmapi/include -I${CMAKE_CURRENT_SOURCE_DIR}/python
+            -I${OPENMM_DIR}/include ${CMAKE_CURRENT_SOURCE_DIR}/${interface}
         DEPENDS ${interfaces} ${headers} VERBATIM)
     Python_add_library(${name} MODULE WITH_SOABI ${wrapper})
     pse_defaults(${name})
