@@ -72,7 +72,7 @@ def testConstructorValues(position, name, values):
     ("StepSize", "setStepSize", [0.0, -1.0, NAN, INF]),
     ("ErrorTolerance", "setErrorTolerance", [0.0, 9e-11, 0.11, -1e-3, NAN, INF]),
     ("MobilityModel", "setMobilityModel", [-1, 3]), ("FluidBoundary", "setFluidBoundary", [-1, 3]),
-    ("Split", "setSplit", [-1, 3]),
+    ("Split", "setSplit", [-1, 4]),
     ("SplittingParameter", "setSplittingParameter", [-1.0, NAN, INF]),
     ("WindowSupport", "setWindowSupport", [-1, 1, 2, 17]),
     ("ShearRate", "setShearRate", [NAN, INF])])
