@@ -9,6 +9,7 @@ import scenes
 from openmmpse import PSEBrownianIntegrator
 from scenes import FALSE_ALARM, KB, Scene, errorRatio, makeContext, positionsOf, randomForces
 
+pytestmark = pytest.mark.onePrecision
 T, DT = 300.0, 0.5
 PLAN = ("split", "xi", "realCutoff", "gridDimensions", "windowSupport", "windowShape")
 

@@ -161,3 +161,15 @@ def testABoxThatChangesNeedsNoNewProgram(platformName, monkeypatch, tmp_path):
     integrator.step(1)
     assert integrator.getNumericalParameters()["gridDimensions"] != (0, 0, 0)
     assert list(tmp_path.glob("particles*")) == []
+
+
+def testShearIsRefused(platformName):
+    """At creation and later; and no flow happens."""
+    s = Scene([[1, 1, 1], [3, 1, 2]], 6*np.eye(3), 0.5)
+    context, integrator = makeContext(s, platformName, 0)
+    for refuse in (lambda: integrator.setShearRate(0.1),
+                   lambda: makeContext(s, platformName, 0, configure=lambda i: i.setShearRate(0.1))):
+        with pytest.raises(openmm.OpenMMException, match="setShearRate.*the platform CPU"):
+            refuse()
+    assert integrator.getShearRate()._value == 0
+    integrator.step(1)

@@ -17,6 +17,7 @@ from scenes import (KB, assertUnitCovariance, assertZeroMean, errorRatio, forceK
                     mobilityColumns, positionsOf, randomForces, stored, whiten)
 from test_noise import assertSameNoise, samplesOf
 
+pytestmark = pytest.mark.onePrecision
 T, DT = 300.0, 2.0
 VARIANCE = 2*KB*T*DT
 TOLERANCES = {"Reference": [1e-2, 1e-5, 1e-8], "CPU": [1e-2, 1e-3, 1e-5, 1e-8],

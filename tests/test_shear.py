@@ -16,6 +16,7 @@ from platformnames import contextOn, isDevice
 from scenes import FALSE_ALARM, KB, Scene, errorRatio, makeContext, positionsOf, randomForces
 from test_bad_input import assertMentions, messageOf
 
+pytestmark = pytest.mark.hostOnly  # devices refuse shear: test_devices.py
 STEADY, OSCILLATORY, STARTUP = (PSEBrownianIntegrator.SteadyShear,
                                 PSEBrownianIntegrator.OscillatoryShear,
                                 PSEBrownianIntegrator.StartUpShear)
@@ -364,19 +365,6 @@ def testShearAndABarostatAreRefused(platformName):
     forces = [scenes.periodicDummyForce(s.count, s.box), openmm.MonteCarloBarostat(1.0, T)]
     context, integrator = makeContext(s, platformName, T, forces=forces)
     assertMentions(messageOf(integrator.setShearRate, 0.1), "MonteCarloBarostat", "remove")
-    assert integrator.getShearRate()._value == 0
-    integrator.step(1)
-
-
-@pytest.mark.deviceOnly
-@pytest.mark.onePrecision
-def testRectangularBoxOnADeviceIsRefused(platformName):
-    """OpenMM's programs for a rectangular box know no tilt: refused, and no flow happens."""
-    s = scenes.randomSuspension(10, 0.1, scenes.cube(1.0), 0.5, 3)
-    message = messageOf(lambda: makeContext(s, platformName, configure=shear(0.1)))
-    assertMentions(message, "setShearRate", "rectangular", "setDefaultPeriodicBoxVectors")
-    context, integrator = makeContext(s, platformName)
-    assertMentions(messageOf(integrator.setShearRate, 0.1), "setDefaultPeriodicBoxVectors")
     assert integrator.getShearRate()._value == 0
     integrator.step(1)
 

@@ -13,6 +13,7 @@ from oracle import freeSpaceScalars, unboundedMobilityMatrix
 from platformnames import contextOn, coordinateRounding, isDevice, lowestTolerance, precisionOf, served
 from scenes import ETA, KB, forcesOf, positionsOf, velocitiesOf
 
+pytestmark = pytest.mark.onePrecision
 TEMPERATURE, STEP = 300.0, 1.0
 MODELS = {PSEBrownianIntegrator.RotnePragerYamakawa: freeSpaceScalars}
 NAMES = {PSEBrownianIntegrator.RotnePragerYamakawa: "RPY"}
