@@ -89,6 +89,11 @@ def recordScenes():
             runOnOpenCL(scene, precision, tolerance, lambda it: it.setSplit(split))
         for scene, tolerance in unequalSpheres():
             runOnOpenCL(scene, precision, tolerance, lambda it: None)
+            unbounded = PSEBrownianIntegrator.Unbounded
+            runOnOpenCL(scene, precision, tolerance, lambda it: it.setFluidBoundary(unbounded))
+        runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setFluidBoundary(unbounded))
+        gaussian = PSEBrownianIntegrator.ForceCoupling
+        runOnOpenCL(suspensions[0], precision, 1e-2, lambda it: it.setMobilityModel(gaussian))
         freely = PSEBrownianIntegrator.FreeDraining
         runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setMobilityModel(freely))
 
