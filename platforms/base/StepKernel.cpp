@@ -328,7 +328,6 @@ PlannedStepKernel::Prepared PlannedStepKernel::prepared(const PlanRequest& next)
     }
 }
 
-/** All radii, or where there are many what tells them from others. */
 string PlannedStepKernel::signature(const Plan& plan) const {
     const NumericalParameters p = parametersOf(plan);
     std::ostringstream text;
@@ -405,7 +404,9 @@ void PlannedStepKernel::setStepState(const StepState& state) {
 void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
     const StepState state = getStepState();
     writeText(stream, CHECKPOINT_MAGIC);
-    writeText(stream, signature(request ? prepared(requestOf(state)).plan : currentPlan));
+    // The box may have changed since the last step: what counts is the Plan that the next will use.
+    const std::optional<Prepared> next = request ? prepareFor(currentBox()) : std::nullopt;
+    writeText(stream, signature(next ? next->plan : currentPlan));
     write(stream, seed);
     write(stream, state.step);
     write(stream, state.sample);
