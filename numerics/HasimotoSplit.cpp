@@ -45,14 +45,13 @@ HasimotoSplit::HasimotoSplit(double xi) : xi(xi) {
     // (r - 2)^2).
     kEnd = 13 * xi;
     largestDistance = CONTACT + 8 / xi;
-    // A Gauss-Legendre rule resolves cos(k r) on [0, kEnd] once it has kEnd r/2 nodes; w itself
-    // oscillates as cos(2 k).
-    const int n = static_cast<int>(60 + 0.6 * kEnd * (largestDistance + 2));
-    const Quadrature rule = gaussLegendre(n, 0, kEnd);
+    // w itself oscillates as cos(2 k)
+    const int n = static_cast<int>(1 + 0.75 * kEnd * (largestDistance + 2));
+    const Quadrature rule = gaussPanels(n, 0, kEnd);
     waveNumbers = rule.nodes;
-    weights.resize(n);
-    for (int i = 0; i < n; i++)
-        weights[i] = 3 / M_PI * rule.weights[i] * waveWeight(rule.nodes[i]);
+    weights = rule.weights;
+    for (size_t i = 0; i < weights.size(); i++)
+        weights[i] *= 3 / M_PI * waveWeight(waveNumbers[i]);
     prepareTails();
 }
 

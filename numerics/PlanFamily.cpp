@@ -280,15 +280,17 @@ Plan HasimotoPlans::best() const {
     else {
         const double longest =
             std::max({request.box.length(0), request.box.length(1), request.box.length(2)});
-        // From a range of about the whole box (few particles in a large box) to one below contact.
-        const double first = std::min(0.03, 6 * request.radius / longest), last = 2.0,
-                     factor = 1.12;
+        // From a range below contact to one of about the whole box (few particles in a large box).
+        constexpr double LARGEST = 2, FACTOR = 1.12;
+        std::vector<double> parameters = {std::min(0.03, 6 * request.radius / longest)};
+        while (parameters.back() * FACTOR < LARGEST)
+            parameters.push_back(parameters.back() * FACTOR);
         // A prescribed grid serves only some xi: the cheapest of those, else the one with the
         // smallest error.
         const bool gridGiven = (request.overrides.grid[0] > 0);
         double lowest = std::numeric_limits<double>::infinity();
-        for (double xi = first; xi < last; xi *= factor) {
-            Plan plan = at(xi, cost);
+        for (auto xi = parameters.rbegin(); xi != parameters.rend(); ++xi) {
+            Plan plan = at(*xi, cost);
             if (gridGiven) {
                 checkPlan(plan, request);
                 plan = finished(plan, nyquistOf(plan));
@@ -299,6 +301,9 @@ Plan HasimotoPlans::best() const {
                 lowest = cost;
                 best = plan;
             }
+            // wider ranges cost more; sums over images are for few particles, whatever they cost
+            if (!plan.sumImages && realCost(plan.realCutoff) > lowest)
+                break;
         }
     }
     checkPlan(best, request);

@@ -158,7 +158,7 @@ double ProlateSplit::realTruncation(double rc, double phi, double meanPhi) const
     const auto add = [&](double from, double to) {
         if (from >= to)
             return;
-        const Quadrature rule = gaussLegendre(64, from, to);
+        const Quadrature rule = gaussPanels(PANEL_NODES, from, to);
         for (size_t i = 0; i < rule.nodes.size(); i++) {
             const double r = rule.nodes[i], shell = 4 * M_PI * r * r * rule.weights[i];
             const PairScalars real = realScalars(r);

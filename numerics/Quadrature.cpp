@@ -30,4 +30,19 @@ Quadrature gaussLegendre(int n, double from, double to) {
     return rule;
 }
 
+Quadrature gaussPanels(int n, double from, double to) {
+    static const Quadrature panel = gaussLegendre(PANEL_NODES, -1, 1);
+    const int panels = (n + PANEL_NODES - 1) / PANEL_NODES;
+    const double half = 0.5 * (to - from) / panels;
+    Quadrature rule;
+    rule.nodes.reserve(panels * PANEL_NODES);
+    rule.weights.reserve(panels * PANEL_NODES);
+    for (int p = 0; p < panels; p++)
+        for (int i = 0; i < PANEL_NODES; i++) {
+            rule.nodes.push_back(from + half * (2 * p + 1 + panel.nodes[i]));
+            rule.weights.push_back(half * panel.weights[i]);
+        }
+    return rule;
+}
+
 } // namespace PSE::numerics

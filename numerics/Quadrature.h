@@ -18,6 +18,14 @@ struct Quadrature {
  */
 Quadrature gaussLegendre(int n, double from, double to);
 
+/**
+ * The rule of PANEL_NODES nodes on each of the fewest equal panels that have n nodes together: for
+ * many nodes in little time. Where a panel has 3/4 nodes for each radian of an oscillation, the
+ * error is about 1e-14.
+ */
+Quadrature gaussPanels(int n, double from, double to);
+constexpr int PANEL_NODES = 64;
+
 } // namespace PSE::numerics
 
 #endif

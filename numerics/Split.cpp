@@ -14,13 +14,12 @@ PairScalars Split::realScalars(double r) const {
 
 Split::DroppedWaves Split::integrateWaves(double from, double to,
                                           const std::function<double(double)>& share) const {
-    static const Quadrature rule = gaussLegendre(64, -1, 1);
-    const double mid = 0.5 * (from + to), half = 0.5 * (to - from);
+    const Quadrature rule = gaussPanels(PANEL_NODES, from, to);
     DroppedWaves sum = {0, 0};
     for (size_t i = 0; i < rule.nodes.size(); i++) {
-        const double k = mid + half * rule.nodes[i], w = waveWeight(k);
-        sum.pairs += half * rule.weights[i] * share(k) * w * w / (k * k);
-        sum.self += half * rule.weights[i] * share(k) * w;
+        const double k = rule.nodes[i], w = waveWeight(k);
+        sum.pairs += rule.weights[i] * share(k) * w * w / (k * k);
+        sum.self += rule.weights[i] * share(k) * w;
     }
     return sum;
 }

@@ -87,6 +87,22 @@ TEST(Quadrature, NodesOfSmallRulesAreTheClosedForms) {
     EXPECT_NEAR(three.weights[1], 8.0 / 9, 1e-15);
 }
 
+TEST(Quadrature, PanelsResolveOscillationsWithThreeQuartersOfANodePerRadian) {
+    for (double k : {0.5, 30.0, 85.3, 400.0, 3000.0}) {
+        const double from = -1, to = 2;
+        const Quadrature rule = gaussPanels(static_cast<int>(0.75 * k * (to - from)), from, to);
+        ASSERT_EQ(rule.nodes.size() % PANEL_NODES, 0u);
+        double cosine = 0, cubic = 0;
+        for (size_t i = 0; i < rule.nodes.size(); i++) {
+            ASSERT_GT(rule.nodes[i], i == 0 ? from : rule.nodes[i - 1]);
+            cosine += rule.weights[i] * std::cos(k * rule.nodes[i]);
+            cubic += rule.weights[i] * std::pow(rule.nodes[i], 3);
+        }
+        EXPECT_NEAR(cosine, (std::sin(k * to) - std::sin(k * from)) / k, 1e-14 + 1e-16 * k) << k;
+        EXPECT_NEAR(cubic, 15.0 / 4, 1e-13);
+    }
+}
+
 TEST(Quadrature, LargeRulesResolveOscillations) {
     // A rule of n nodes resolves cos(k x) on an interval of length L once n > k L/2.
     for (int n : {200, 1000}) {
