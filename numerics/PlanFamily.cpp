@@ -39,6 +39,8 @@ constexpr double USUAL_MAGNIFICATION = 8;
 constexpr double SMALLEST_WINDOW_ERROR = 1e-12;
 constexpr double SINGLE_ROUNDING = 3e-7, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
+/// up to which errors of tables add up to 0.1 tolerance at most where all forces are alike
+constexpr double NEIGHBOURS_ALIKE = 400;
 
 /**
  * Support and grid spacing that keep the error of the wave half, [T15]: digits + 2 points, or one
@@ -153,7 +155,9 @@ void PlanFamily::completeRealHalf(Plan& plan) const {
     plan.sumImages = plan.realCutoff > LARGEST_LIST_RANGE * narrowestWidth(request);
     plan.lanczosTolerance =
         (wish.lanczosTolerance > 0 ? wish.lanczosTolerance : 0.5 * request.tolerance);
-    plan.tableError = TABLE_SHARE * request.tolerance * boxShare(request);
+    const double neighbours = meanNeighbours(request.box, request.numParticles, plan.realCutoff);
+    plan.tableError = TABLE_SHARE * request.tolerance * boxShare(request) /
+                      std::max(1.0, neighbours / NEIGHBOURS_ALIKE);
     const bool single = request.tolerance >= request.singleFloor &&
                         (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
     plan.precision = (single ? Precision::Single : Precision::Double);

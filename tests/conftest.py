@@ -6,6 +6,7 @@ test_platforms.py tells it, by a skipped test for each.
 """
 import pytest
 
+from hardcases import HARD_CASE, HardCase, writeTable
 from platformnames import DEVICES, NAMES, VARIANTS, absence, familyOf, isDevice, isDirect
 
 NOWHERE = pytest.param(None, id="nowhere")
@@ -25,6 +26,8 @@ def pytest_addoption(parser):
         choices=list(dict.fromkeys((*VARIANTS, *NAMES))),
         help="run the tests on this platform only (may be repeated); default: all",
     )
+    parser.addoption("--long", action="store_true", help="hard cases in full, not in their short form")
+    parser.addoption("--torture-table", metavar="FILE", help="write the table of hard cases here")
 
 
 def pytest_configure(config):
@@ -84,5 +87,17 @@ def pytest_terminal_summary(terminalreporter):
     for outcome in ("passed", "failed"):
         for report in terminalreporter.getreports(outcome):
             for title, table in report.user_properties:
-                terminalreporter.section(title)
-                terminalreporter.write_line(table)
+                if title != HARD_CASE:
+                    terminalreporter.section(title)
+                    terminalreporter.write_line(table)
+    destination = terminalreporter.config.getoption("torture_table")
+    if destination:
+        writeTable(destination, terminalreporter.stats.get("", ())) # here are those of teardowns
+
+
+@pytest.fixture
+def hardCase(request):
+    """What a test of tests/torture tells of itself: its row in the table of docs/robustness.md."""
+    case = HardCase(request)
+    yield case
+    case.tell()

@@ -278,6 +278,7 @@ void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position) const 
     else
         message << FARTHEST << " boxes, and its place in the box is lost to rounding; set "
                 << "positions nearer to the box";
+    message << ", and if steps have brought it there, use a smaller step size";
     throw OpenMMException(message.str());
 }
 

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: MIT
+"""Faults of the surroundings: after each a clear error, the last good state, a live process."""
+import multiprocessing
+import os
+import signal
+import threading
+
+import numpy as np
+import openmm
+import pytest
+
+import openmmpse
+import scenes
+from scenes import makeContext, positionsOf, velocitiesOf
+
+pytestmark = pytest.mark.onePrecision
+
+RADIUS = 0.5
+TEMPERATURE = 300.0
+HEADER = 200 # bytes of a checkpoint that contain what OpenMM itself puts first
+
+
+def suspension():
+    return scenes.randomSuspension(12, 0.05, scenes.cube(1), RADIUS, 741)
+
+
+def run(platformName, steps=4, forces=(), seed=5):
+    context, integrator = makeContext(suspension(), platformName, TEMPERATURE, 0.5, seed=seed,
+                                      forces=forces)
+    integrator.step(steps)
+    return context, integrator
+
+
+def stateOf(context):
+    return positionsOf(context), context.getTime()._value, context.getStepCount()
+
+
+def assertUntouched(context, before):
+    after = stateOf(context)
+    assert np.array_equal(before[0], after[0]) and before[1:] == after[1:]
+
+
+def refusalOf(call, *arguments, kinds=openmm.OpenMMException):
+    with pytest.raises(kinds) as caught:
+        call(*arguments)
+    return str(caught.value)
+
+
+def failingForce(action, after):
+    """A PythonForce on all particles that does `action` once, at its call number `after`."""
+    calls = []
+
+    def compute(state):
+        calls.append(1)
+        forces = np.zeros((12, 3))
+        return action(forces) if len(calls) == after else (0.0, forces)
+
+    return openmm.PythonForce(compute)
+
+
+def testAForceThatReturnsNoNumber(platformName, hardCase):
+    """
+    A PythonForce that returns NaN for one particle in its sixth call.
+
+    The step is refused and names that particle; positions, time and count are those before; the run
+    goes on.
+    """
+    def action(forces):
+        forces[7, 1] = np.nan
+        return 0.0, forces
+
+    context, integrator = run(platformName, forces=[failingForce(action, 6)])
+    steps = context.getStepCount()
+    message = refusalOf(integrator.step, 10)
+    assert "force of particle 7" in message and "nan" in message.lower()
+    before = stateOf(context)
+    assert steps <= before[2] <= steps + 2 and np.all(np.isfinite(before[0]))
+    integrator.step(3)
+    assert context.getStepCount() == before[2] + 3
+    hardCase.measure(**{"steps before": before[2]})
+
+
+def testAForceThatThrows(platformName, hardCase):
+    """
+    A PythonForce that raises ValueError in its sixth call.
+
+    The caller gets an exception with its text; positions, time and count are those before; the run
+    goes on.
+    """
+    def action(forces):
+        raise ValueError("no parameters for this bond")
+
+    context, integrator = run(platformName, forces=[failingForce(action, 6)])
+    message = refusalOf(integrator.step, 10, kinds=Exception)
+    assert "no parameters for this bond" in message
+    before = stateOf(context)
+    integrator.step(3)
+    assert context.getStepCount() == before[2] + 3
+    hardCase.measure(**{"steps before": before[2]})
+
+
+def testPositionsThatAreNotFinite(platformName, hardCase):
+    """
+    Positions set to infinity.
+
+    The step is refused and names the particle; with good positions the run goes on as if nothing
+    had happened, to the bit.
+    """
+    context, integrator = run(platformName)
+    other, twin = run(platformName)
+    good = positionsOf(context)
+    bad = good.copy()
+    bad[3, 2] = np.inf
+    context.setPositions(bad)
+    assert "position of particle 3" in refusalOf(integrator.step, 1)
+    context.setPositions(good)
+    other.setPositions(good)
+    integrator.step(3)
+    twin.step(3)
+    assert np.array_equal(positionsOf(context), positionsOf(other))
+    hardCase.measure(difference=0)
+
+
+def testABoxBelowTheLimit(platformName, hardCase):
+    """
+    The box shrunk to a twentieth of the radius in mid-run.
+
+    The step is refused with the limit; positions, time and count are those before; in the old box
+    the run goes on.
+    """
+    context, integrator = run(platformName)
+    box = context.getState().getPeriodicBoxVectors()
+    before = stateOf(context)
+    context.setPeriodicBoxVectors(*(0.05*RADIUS*np.eye(3)))
+    message = refusalOf(integrator.step, 1)
+    assert "box" in message and "larger" in message
+    assertUntouched(context, before)
+    context.setPeriodicBoxVectors(*box)
+    integrator.step(2)
+    assert np.all(np.isfinite(positionsOf(context)))
+    hardCase.measure(message=message.partition(";")[2].strip())
+
+
+@pytest.mark.withGrid
+def testAGridBeyondMemory(platformName, hardCase):
+    """
+    A prescribed grid of 20,000 points in each direction.
+
+    The Context is refused before anything is allocated, with a remedy; a new one with the automatic
+    grid works.
+    """
+    def configure(integrator):
+        integrator.setGridDimensions(20000, 20000, 20000)
+
+    message = refusalOf(lambda: makeContext(suspension(), platformName, configure=configure))
+    assert "memory" in message or "grid" in message
+    context, integrator = run(platformName)
+    hardCase.measure(message=message.partition(";")[2].strip())
+
+
+def testACheckpointCutOffOrForeign(platformName, hardCase):
+    """
+    Checkpoints cut off at any of 40 places behind the header of OpenMM (which reads on where its
+    header ends too early), and one of openmm.BrownianIntegrator.
+
+    All are refused; the good one still loads and continues to the bit.
+    """
+    context, integrator = run(platformName)
+    checkpoint = context.createCheckpoint()
+    integrator.step(3)
+    expected = positionsOf(context)
+    rng = np.random.default_rng(742)
+    other, fresh = run(platformName, seed=6)
+    for cut in rng.integers(1, len(checkpoint) - HEADER, 40):
+        refusalOf(other.loadCheckpoint, checkpoint[:-int(cut)])
+    theirs = openmm.BrownianIntegrator(TEMPERATURE, 50.0, 0.5)
+    foreign = scenes.contextOn(platformName, scenes.makeSystem(suspension()), theirs, 1)
+    foreign.setPositions(suspension().positions)
+    refusalOf(other.loadCheckpoint, foreign.createCheckpoint())
+    other.loadCheckpoint(checkpoint)
+    fresh.step(3)
+    assert np.array_equal(positionsOf(other), expected)
+    hardCase.measure(refused=41)
+
+
+def testXmlOfAFutureVersion(hardCase):
+    """
+    The XML of an integrator of version 99.
+
+    Refused with both versions.
+    """
+    text = openmm.XmlSerializer.serialize(openmmpse.PSEBrownianIntegrator(300.0, 600.0, 0.5, 1.0))
+    assert 'version="1"' in text
+    message = refusalOf(openmm.XmlSerializer.deserialize,
+                        text.replace('version="1"', 'version="99"'))
+    assert "99" in message and "version 1" in message
+    hardCase.measure(message=message)
+
+
+def testKeyboardInterrupt(platformName, hardCase):
+    """
+    SIGINT during a long call of step(), five times.
+
+    KeyboardInterrupt at a whole step, positions finite; a checkpoint from then continues to the bit.
+    """
+    context, integrator = run(platformName)
+    counts = []
+    for _ in range(5):
+        timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                for _ in range(10**6):
+                    integrator.step(10)
+        finally:
+            timer.cancel()
+        counts.append(context.getStepCount())
+        assert np.all(np.isfinite(positionsOf(context)))
+    assert counts == sorted(counts)
+    checkpoint = context.createCheckpoint()
+    integrator.step(3)
+    other, fresh = run(platformName)
+    other.loadCheckpoint(checkpoint)
+    fresh.step(3)
+    assert np.array_equal(positionsOf(other), positionsOf(context))
+    hardCase.measure(steps=counts[-1])
+
+
+def testTwoContextsInTwoThreads(platformName, hardCase):
+    """
+    Two Contexts with two integrators, each stepping in a thread of its own at the same time.
+
+    Both get the trajectories that each gets alone, to the bit.
+    """
+    steps = 40
+    alone = [positionsOf(run(platformName, steps, seed=seed)[0]) for seed in (5, 6)]
+    together = [None, None]
+
+    def work(i):
+        together[i] = positionsOf(run(platformName, steps, seed=5 + i)[0])
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for i in (0, 1):
+        assert np.array_equal(alone[i], together[i])
+    hardCase.measure(difference=0)
+
+
+def testContextDroppedDuringARun(platformName, hardCase):
+    """
+    The only other reference to a Context dropped while a thread steps its integrator, 10 times.
+
+    The process lives; the steps end or are refused.
+    """
+    ended = 0
+    for _ in range(10):
+        context, integrator = run(platformName, 1)
+        started = threading.Event()
+
+        def work(integrator=integrator, context=[context]):
+            started.set()
+            integrator.step(50)
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        started.wait()
+        del context, work
+        thread.join(60)
+        assert not thread.is_alive()
+        ended += 1
+    hardCase.measure(runs=ended)
+
+
+def child(queue, seed):
+    try:
+        queue.put(positionsOf(run("Reference", 3, seed=seed)[0]))
+    except Exception as error: # told to the parent, which asserts
+        queue.put(error)
+
+
+@pytest.mark.hostOnly
+def testForkAfterUse(platformName, hardCase):
+    """
+    A process that has used a Context forks; the child makes a new one on Reference.
+
+    The child gets the right positions within a minute, the parent goes on.
+    """
+    context, integrator = run(platformName)
+    fork = multiprocessing.get_context("fork")
+    queue = fork.Queue()
+    process = fork.Process(target=child, args=(queue, 9))
+    process.start()
+    found = queue.get(timeout=60)
+    process.join(60)
+    assert process.exitcode == 0
+    assert np.array_equal(found, positionsOf(run("Reference", 3, seed=9)[0]))
+    integrator.step(3)
+    assert np.all(np.isfinite(velocitiesOf(context)))
+    hardCase.measure(**{"exit code": process.exitcode})
