@@ -42,6 +42,16 @@ Lattice Lattice::sheared(double strain) const {
     return Lattice(v.col(0), v.col(1), v.col(2));
 }
 
+std::array<int, 2> Lattice::flips(double strain) const {
+    const Matrix3 after = sheared(strain).vectors();
+    std::array<int, 2> count;
+    for (int d = 1; d < 3; d++) {
+        const double taken = boxVectors(0, d) + strain * boxVectors(1, d) - after(0, d);
+        count[d - 1] = static_cast<int>(std::nearbyint(taken / boxVectors(0, 0)));
+    }
+    return count;
+}
+
 Lattice Lattice::mostSheared() const {
     Matrix3 v = boxVectors;
     for (int d = 1; d < 3; d++)

@@ -3,6 +3,7 @@
 #define OPENMMPSE_NUMERICS_LATTICE_H_
 
 #include "numerics/Vec3.h"
+#include <array>
 #include <vector>
 
 namespace PSE::numerics {
@@ -55,6 +56,11 @@ public:
      * whichever of its vectors tell of it [T35]. An edge in y has its tilt in [-ax/2, ax/2].
      */
     Lattice sheared(double strain) const;
+    /**
+     * How many a sheared() takes from b and from c, which the flow alone would have tilted
+     * further: its b is b + strain b_y e_x - flips[0] a.
+     */
+    std::array<int, 2> flips(double strain) const;
     /** The box of the longest vectors that sheared() can return for any strain. */
     Lattice mostSheared() const;
     Lattice scaled(double factor) const;

@@ -163,13 +163,23 @@ def testABoxThatChangesNeedsNoNewProgram(platformName, monkeypatch, tmp_path):
     assert list(tmp_path.glob("particles*")) == []
 
 
-def testShearIsRefused(platformName):
-    """At creation and later; and no flow happens."""
-    s = Scene([[1, 1, 1], [3, 1, 2]], 6*np.eye(3), 0.5)
-    context, integrator = makeContext(s, platformName, 0)
-    for refuse in (lambda: integrator.setShearRate(0.1),
-                   lambda: makeContext(s, platformName, 0, configure=lambda i: i.setShearRate(0.1))):
-        with pytest.raises(openmm.OpenMMException, match="setShearRate.*the platform CPU"):
+def testARectangularDefaultBoxIsNotSheared(platformName):
+    """At creation and later, with a remedy that works: a small tilt, which may be taken back to zero."""
+    s = Scene(np.array([[1.0, 1, 1], [3, 1, 2]]), 6*np.eye(3), 0.5)
+
+    def make(scene, rate):
+        return makeContext(scene, platformName, 0, configure=lambda i: i.setShearRate(rate))
+    context, integrator = make(s, 0.0)
+    for refuse in (lambda: integrator.setShearRate(0.1), lambda: make(s, 0.1)):
+        with pytest.raises(openmm.OpenMMException,
+                           match="setShearRate.*rectangular.*setDefaultPeriodicBoxVectors.*platform CPU"):
             refuse()
     assert integrator.getShearRate()._value == 0
     integrator.step(1)
+    box = 6*np.eye(3)
+    box[1, 0] = 0.006
+    context, integrator = make(Scene(s.positions, box, 0.5), 0.1)
+    context.setPeriodicBoxVectors(*s.box)
+    integrator.step(1)
+    assert np.allclose(positionsOf(context), s.positions + 0.1*s.positions[:, 1:2]*[1, 0, 0], atol=1e-6)
+    assert np.allclose(context.getState().getPeriodicBoxVectors()._value, [[6, 0, 0], [0.6, 6, 0], [0, 0, 6]])

@@ -16,7 +16,6 @@ from platformnames import contextOn, isDevice
 from scenes import FALSE_ALARM, KB, Scene, errorRatio, makeContext, positionsOf, randomForces
 from test_bad_input import assertMentions, messageOf
 
-pytestmark = pytest.mark.hostOnly  # devices refuse shear: test_devices.py
 STEADY, OSCILLATORY, STARTUP = (PSEBrownianIntegrator.SteadyShear,
                                 PSEBrownianIntegrator.OscillatoryShear,
                                 PSEBrownianIntegrator.StartUpShear)
@@ -74,18 +73,12 @@ def run(context, integrator, steps):
 
 # ---------------------------------------------------------------- the flow
 
-@pytest.mark.parametrize("model", ["fluid", "free draining"])
-@pytest.mark.parametrize("protocol, time, strain", [
-    (STEADY, 0.0, lambda t: 0.037*t),
-    (OSCILLATORY, 31.0, lambda t: 0.037*31/(2*np.pi)*np.sin(2*np.pi*t/31)),
-    (STARTUP, 7.25, lambda t: 0.037*max(0.0, t - 7.25))])
-def testFreeParticlesFollowTheFlow(platformName, model, protocol, time, strain):
-    """x = x0 + strain y0, exactly, whatever the tilt and its flips; velocities are displacements."""
+def followFreeParticles(platformName, protocol, time, strain, more):
     s = Scene(np.array([[1.0, 2.0, 3.0], [4.0, 6.5, 5.0], [0.5, -3.0, 1.0]]),
               barelyTilted(np.diag([6.0, 7.0, 8.0])), 0.5)
     context, integrator = makeContext(
         s, platformName, 0.0, DT, forces=[scenes.periodicDummyForce(3, s.box)],
-        configure=shear(0.037, protocol, time, freeDraining if model != "fluid" else None))
+        configure=shear(0.037, protocol, time, more))
     for t in range(1, 61):
         before = positionsOf(context)
         integrator.step(1)
@@ -102,6 +95,21 @@ def testFreeParticlesFollowTheFlow(platformName, model, protocol, time, strain):
         assert np.allclose(np.diag(box), [6, 7, 8], rtol=1e-6) and box[2, 0] == box[2, 1] == 0
 
 
+@pytest.mark.parametrize("protocol, time, strain", [
+    (STEADY, 0.0, lambda t: 0.037*t),
+    (OSCILLATORY, 31.0, lambda t: 0.037*31/(2*np.pi)*np.sin(2*np.pi*t/31)),
+    (STARTUP, 7.25, lambda t: 0.037*max(0.0, t - 7.25))])
+def testFreeParticlesFollowTheFlow(platformName, protocol, time, strain):
+    """x = x0 + strain y0, exactly, whatever the tilt and its flips; velocities are displacements."""
+    followFreeParticles(platformName, protocol, time, strain, freeDraining)
+
+
+@pytest.mark.onePrecision
+def testParticlesInTheFluidFollowTheFlow(platformName):
+    followFreeParticles(platformName, STEADY, 0.0, lambda t: 0.037*t, None)
+
+
+@pytest.mark.onePrecision
 def testEveryVectorWithAYComponentTilts(platformName):
     """c tilts by its own y component; images keep their distances through every flip."""
     box = np.array([[6.0, 0, 0], [0.5, 7, 0], [-2.0, 3.0, 8]])
@@ -159,14 +167,14 @@ def testVelocitiesAtEveryStrain(platformName):
     context, integrator = makeContext(s, platformName, tolerance=tolerance, configure=shear(0.13))
     forces = randomForces(s)
     plan = integrator.getNumericalParameters()
+    integrator.step(3)
+    assert "wave factors of the moving box" in integrator.describe()
     for _ in range(12):
         integrator.step(1)
         now = Scene(positionsOf(context), boxOf(context), s.radius)
         error = errorRatio(integrator.applyMobility(forces), now.velocities(forces), forces, now)
         assert error <= tolerance
     assert integrator.getNumericalParameters() == plan
-    integrator.step(2)
-    assert "wave factors of the moving box" in integrator.describe()
 
 
 @pytest.mark.onePrecision
@@ -189,7 +197,7 @@ def testTwoReducedFormsOfOneLattice(platformName):
             scenes.whiten(samples, 2*KB*T*DT*exact.mobility), "noise", tests=2)
 
 
-@pytest.mark.onePrecision
+@pytest.mark.hostOnly  # what decides it is the Plan's alone
 @pytest.mark.withGrid
 def testErrorUnderShearIsThatOfTheOrthogonalBox(platformName):
     """At fixed xi, grid and support, mean over 20 configurations, half tilt against none."""
@@ -254,6 +262,7 @@ def testWithoutARateNothingChanges(platformName):
 
 # ---------------------------------------------------------------- changes and restarts
 
+@pytest.mark.onePrecision
 def testRateThatChangesWhileRunning(platformName):
     """From zero to a rate, the Plan is made anew for the worst tilt; back to zero it stays."""
     s = suspension()
@@ -276,6 +285,7 @@ def testRateThatChangesWhileRunning(platformName):
             == integrator.getNumericalParameters()["gridDimensions"])
 
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("way", ["checkpoint", "state"])
 @pytest.mark.parametrize("protocol, time", [(STEADY, 0.0), (OSCILLATORY, 9.0)])
 def testRestartUnderShear(platformName, way, protocol, time):
@@ -322,6 +332,7 @@ def testCopiesKeepTheProtocol():
 
 # ---------------------------------------------------------------- Forces see the sheared images
 
+@pytest.mark.onePrecision
 @pytest.mark.parametrize("still", [1, 3, 60])
 def testForcesInAShearedBox(platformName, still):
     """

@@ -33,12 +33,15 @@ constexpr double LARGEST_INDEX = 2e9;
 } // namespace
 
 CommonStepKernel::CommonStepKernel(std::string name, const OpenMM::Platform& platform,
-                                   OpenMM::ComputeContext& context, int devices)
-    : PlannedStepKernel(name, platform), device(context), numDevices(devices), programs(context) {}
+                                   OpenMM::ComputeContext& context, int devices,
+                                   std::function<void()> forgetLists)
+    : PlannedStepKernel(name, platform), device(context), numDevices(devices),
+      forgetLists(std::move(forgetLists)), programs(context) {}
 
 CommonStepKernel::~CommonStepKernel() {
     ContextSelector selector(device);
     engine.reset();
+    flow.reset();
     programs.clear();
 }
 
@@ -54,6 +57,7 @@ void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegra
                               std::to_string(device.getMaxThreadBlockSize()) + " threads, and " +
                               std::to_string(GROUP_SIZE) +
                               " are needed; use another device or the CPU platform");
+    scene = sceneSeen;
     if (integrator.getShearRate() != 0)
         requireShear(context);
     tolerance = integrator.getErrorTolerance();
@@ -63,8 +67,14 @@ void CommonStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegra
 }
 
 void CommonStepKernel::requireShear(ContextImpl&) const {
-    throw OpenMMException("PSEBrownianIntegrator: setShearRate: this platform has no shear flow; "
-                          "use the platform CPU, or leave the shear rate at 0");
+    if (scene.periodicBox && !device.getBoxIsTriclinic())
+        throw OpenMMException(
+            "PSEBrownianIntegrator: setShearRate: the default box of the System is rectangular, "
+            "and on this platform a Context that began with such a box cannot tilt it; give the "
+            "System a default box with a tilt, however small "
+            "(System.setDefaultPeriodicBoxVectors with b = (0.001 ax, by, 0)), before the Context "
+            "is created: its box may be set to the rectangular one afterwards. Or use the "
+            "platform CPU, or leave the shear rate at 0");
 }
 
 void CommonStepKernel::boxVectors(OmmVec3 box[3]) const {
@@ -151,6 +161,11 @@ void CommonStepKernel::useEngine(const Plan& plan, const Lattice& box) {
     stepsSinceStart = 0;
 }
 
+void CommonStepKernel::setEngineBox(const Lattice& box) {
+    ContextSelector selector(device);
+    engine->setBox(box);
+}
+
 void CommonStepKernel::useUnbounded(const UnboundedPlan& plan) {
     if (plan.precision == Precision::Double && !realIsDouble(device)) {
         std::ostringstream message;
@@ -177,22 +192,39 @@ void CommonStepKernel::useFreeDraining() {
 void CommonStepKernel::checkPositions(ContextImpl& context) {
     // Our own steps that would lead away from finite positions are refused; those of another
     // integrator, in a CompoundIntegrator, are not.
+    followBoxOfLists();
     const double farthest = farthestPosition();
     const bool near = travelled < SHORT_WAY * farthest;
     if (positionsChecked && near && stepCountSeen == device.getStepCount())
         return;
     vector<OmmVec3> positions;
     context.getPositions(positions);
+    largestCoordinate = 0;
     for (int i : scene.mobile) {
         const Vec3 x = fromOpenMM(positions[i]);
         if (!x.allFinite())
             refuseNotFinite(POSITION, i, x);
         if (x.cwiseAbs().maxCoeff() > farthest)
             refuseFarAway(i, x);
+        largestCoordinate = std::max(largestCoordinate, x.cwiseAbs().maxCoeff());
     }
     positionsChecked = true;
     travelled = 0;
     stepCountSeen = device.getStepCount();
+}
+
+/**
+ * OpenMM's lists of neighbours go by how far particles have moved; a box that moves beneath them is
+ * not noticed there [T37].
+ */
+void CommonStepKernel::followBoxOfLists() {
+    OmmVec3 box[3];
+    boxVectors(box);
+    if (std::equal(box, box + 3, boxOfLists))
+        return;
+    ContextSelector selector(device);
+    forgetLists();
+    std::copy(box, box + 3, boxOfLists);
 }
 
 bool CommonStepKernel::measures() const {
@@ -209,10 +241,13 @@ void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator
     engine->takeForces();
     const Thermal noise = thermal(integrator, false);
     engine->computeVelocities(true, noise.kT > 0 ? &noise : NULL);
-    const double dt = integrator.getStepSize();
-    checkStep(context, dt);
+    const double dt = integrator.getStepSize(), strained = strainOf(device.getTime(), dt);
+    checkStep(context, dt, strained);
     engine->move(dt);
-    travelled += dt * engine->largestVelocity();
+    travelled += dt * engine->largestVelocity() + farthestFlow(strained);
+    if (strained != 0)
+        flowAlong(strained, dt);
+    strain += strained;
     device.getIntegrationUtilities().computeVirtualSites();
     device.setTime(device.getTime() + dt);
     device.setStepCount(device.getStepCount() + 1);
@@ -222,9 +257,29 @@ void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator
     stepsSinceStart++;
 }
 
+/** Particles have made a step; now they follow the flow, and the box does. */
+void CommonStepKernel::flowAlong(double strained, double dt) {
+    if (!flow)
+        flow.emplace(programs);
+    OmmVec3 edges[3];
+    boxVectors(edges);
+    const Lattice box(fromOpenMM(edges[0]), fromOpenMM(edges[1]), fromOpenMM(edges[2]));
+    flow->carry(strained, dt, box);
+    if (scene.periodicBox) {
+        flow->tilt(strained, box);
+        followBoxOfLists();
+    }
+    engine->clock().charge("positions");
+}
+
+/** At least as far as the flow of a strain carries any particle in a step (nm). */
+double CommonStepKernel::farthestFlow(double strained) const {
+    return std::fabs(strained) * (largestCoordinate + travelled);
+}
+
 /** Refuse, before anything moves, what is not finite or leads beyond where positions mean a place.
  */
-void CommonStepKernel::checkStep(ContextImpl& context, double dt) const {
+void CommonStepKernel::checkStep(ContextImpl& context, double dt, double strained) const {
     if (!(engine->largestForce() < LARGEST_FORCE))
         refuseForce(context);
     if (!std::isfinite(engine->largestVelocity()))
@@ -232,8 +287,10 @@ void CommonStepKernel::checkStep(ContextImpl& context, double dt) const {
     const double largest = realIsDouble(device) ? std::numeric_limits<double>::max()
                                                 : std::numeric_limits<float>::max();
     const double farthest = std::min(largest, farthestPosition());
-    if (!(dt * engine->largestVelocity() < farthest))
-        refuseMove(context, dt, farthest);
+    if (!(dt * engine->largestVelocity() + farthestFlow(strained) < farthest))
+        refuseMove(context, dt, strained, farthest);
+    if (strained != 0 && scene.periodicBox)
+        shearedBox(strained); // throws what it would throw later
 }
 
 /** Name the first particle whose force the device cannot hold. */
@@ -254,12 +311,13 @@ void CommonStepKernel::refuseForce(ContextImpl& context) const {
     throw OpenMMException("PSEBrownianIntegrator: a force on this device is not finite");
 }
 
-/** The first particle whose step dt u is not below a limit (nm), and its velocity u. */
-std::pair<int, Vec3> CommonStepKernel::firstBeyond(double dt, double limit) const {
-    std::pair<int, Vec3> first(-1, Vec3::Zero());
-    for (const auto& entry : engine->velocities()) {
-        const Vec3 step = dt * entry.second;
-        const bool fine = step.allFinite() && step.cwiseAbs().maxCoeff() < limit;
+/** The first particle with a component that is not below a limit; index -1 if there is none. */
+CommonStepKernel::OfParticle CommonStepKernel::firstBeyond(const vector<OfParticle>& all,
+                                                           double limit) const {
+    OfParticle first(-1, Vec3::Zero());
+    for (const OfParticle& entry : all) {
+        const Vec3& v = entry.second;
+        const bool fine = v.allFinite() && v.cwiseAbs().maxCoeff() < limit;
         if (!fine && (first.first < 0 || entry.first < first.first))
             first = entry;
     }
@@ -267,21 +325,30 @@ std::pair<int, Vec3> CommonStepKernel::firstBeyond(double dt, double limit) cons
 }
 
 void CommonStepKernel::refuseVelocity() const {
-    const auto worst = firstBeyond(1, std::numeric_limits<double>::infinity());
+    const OfParticle worst =
+        firstBeyond(engine->velocities(), std::numeric_limits<double>::infinity());
     refuseNotFinite(VELOCITY, worst.first, worst.second);
 }
 
-void CommonStepKernel::refuseMove(ContextImpl& context, double dt, double limit) const {
-    const auto worst = firstBeyond(dt, limit);
+/** If a particle's step is not below a limit (nm). */
+void CommonStepKernel::refuseMove(ContextImpl& context, double dt, double strained,
+                                  double limit) const {
     vector<OmmVec3> positions;
     context.getPositions(positions);
+    vector<OfParticle> steps = engine->velocities();
+    for (OfParticle& entry : steps) {
+        entry.second *= dt;
+        entry.second[0] += strained * positions.at(entry.first)[1];
+    }
+    const OfParticle worst = firstBeyond(steps, limit);
+    if (worst.first < 0)
+        return;
     CheckedQuantity quantity = NEXT_POSITION;
     std::ostringstream unit;
     unit << quantity.unit << " (farther than " << limit << " nm from this one)";
     const std::string text = unit.str();
     quantity.unit = text.c_str();
-    refuseNotFinite(quantity, worst.first,
-                    fromOpenMM(positions.at(worst.first)) + dt * worst.second);
+    refuseNotFinite(quantity, worst.first, fromOpenMM(positions.at(worst.first)) + worst.second);
 }
 
 double CommonStepKernel::computeKineticEnergy(ContextImpl&) {

@@ -56,7 +56,8 @@ inline void uploadMixed(OpenMM::ComputeArray& array, OpenMM::ComputeContext& con
 /** An array of vectors of four reals. */
 inline void uploadVectors(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,
                           const std::vector<double>& values, const char* name) {
-    array.initialize(context, values.size() / 4, 4 * realSize(context), name);
+    if (!array.isInitialized())
+        array.initialize(context, values.size() / 4, 4 * realSize(context), name);
     if (realIsDouble(context))
         array.upload(values.data());
     else

@@ -128,12 +128,19 @@ DevicePeriodicEngine::DevicePeriodicEngine(DevicePrograms& programs, int particl
                    plan.hasRealHalf() ? DeviceLanczos::summaryRows(LanczosTridiagonal::REAL_HALF)
                                       : 0,
                    clock, sizesOf(plan)),
-      drag(6 * M_PI * viscosity * plan.a),
+      plan(plan), drag(6 * M_PI * viscosity * plan.a),
       spheres(plan.mixture ? new DeviceSpheres(programs, plan, particles, mobile, places)
                            : nullptr),
       waveSpace(programs, plan, box, places, spheres.get()) {
     if (plan.hasRealHalf())
         realSpace.emplace(programs, plan, box, places, summary, spheres.get());
+}
+
+void DevicePeriodicEngine::setBox(const Lattice& box) {
+    places.setBox(box, cellRange(plan, box));
+    if (realSpace)
+        realSpace->setBox(plan, box);
+    waveSpace.setBox(plan, box);
 }
 
 void DevicePeriodicEngine::setPositions() {

@@ -27,6 +27,10 @@ public:
                  StageClock& clock, std::shared_ptr<const SizeGroups> sizes = nullptr);
     virtual ~DeviceEngine() = default;
 
+    /**
+     * Follow a box that moves, with a Plan made for it. The positions must be set anew.
+     */
+    virtual void setBox(const numerics::Lattice&) {}
     /** Follow the positions of the Context. */
     virtual void setPositions() = 0;
     /** The forces of the Context. */
@@ -87,6 +91,7 @@ public:
     DevicePeriodicEngine(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                          const numerics::Plan& plan, const numerics::Lattice& box, double viscosity,
                          StageClock& clock);
+    void setBox(const numerics::Lattice& box) override;
     void setPositions() override;
     void computeVelocities(bool forced, const Thermal* thermal) override;
     int lanczosIterations() const override {
@@ -96,6 +101,7 @@ public:
 private:
     void launch(bool forced, const Thermal* thermal, double noise);
 
+    const numerics::Plan plan;
     double drag;                              ///< 6 pi eta a
     std::unique_ptr<DeviceSpheres> spheres;   ///< of a mixture, else NULL
     std::optional<DeviceRealSpace> realSpace; ///< none where waves are all there is

@@ -5,6 +5,7 @@
 using namespace OpenMM;
 using PSE::numerics::Lattice;
 using PSE::numerics::Matrix3;
+using PSE::numerics::Plan;
 
 namespace PSE {
 
@@ -15,20 +16,39 @@ std::vector<double> geometryOf(const ComputeContext& context, const Lattice& box
             one * v(2, 2), v(0, 0),       v(0, 1),       v(1, 1)};
 }
 
-bool isTilted(const Lattice& box) {
-    const Matrix3& v = box.vectors();
-    return v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
+DeviceNumbers::DeviceNumbers(DevicePrograms& programs, const char* name) {
+    ComputeContext& context = programs.context();
+    numbers.initialize(context, MOST, realSize(context), name);
+    setNumbers = DeviceKernel(context, programs.particles(), "setNumbers");
 }
 
-int uploadImages(ComputeArray& array, ComputeContext& context, const Lattice& box, double range,
+void DeviceNumbers::set(std::vector<double> values) {
+    values.resize(MOST, 0.0);
+    const auto four = [&](int i) {
+        return Real4{values[i], values[i + 1], values[i + 2], values[i + 3]};
+    };
+    setNumbers(1, numbers, four(0), four(4), four(8), four(12));
+}
+
+bool mayBeTilted(const ComputeContext& context, const Plan& plan, const Lattice& box) {
+    const Matrix3& v = box.vectors();
+    // OpenMM tilts no box of a Context that began with a rectangular one
+    return v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0 ||
+           (plan.moving && context.getBoxIsTriclinic());
+}
+
+int uploadImages(GrowingArray& array, ComputeContext& context, const Lattice& box, double range,
                  double unit) {
     std::vector<double> vectors;
     for (const numerics::Vec3& image : box.imagesWithin(range)) {
         const double other = image == numerics::Vec3::Zero() ? 0 : 1;
         vectors.insert(vectors.end(), {image[0] / unit, image[1] / unit, image[2] / unit, other});
     }
-    uploadVectors(array, context, vectors, "pseImages");
-    return static_cast<int>(vectors.size() / 4);
+    const size_t count = vectors.size() / 4;
+    array.reserve(context, count, 4 * realSize(context), "pseImages");
+    vectors.resize(4 * array.size(), 0.0);
+    uploadVectors(*array, context, vectors, "pseImages");
+    return static_cast<int>(count);
 }
 
 } // namespace PSE

@@ -20,6 +20,13 @@ struct Real {
 struct Mixed {
     double value;
 };
+/** Four of them as one vector. */
+struct Real4 {
+    double x, y, z, w;
+};
+struct Mixed4 {
+    double x, y, z, w;
+};
 
 inline bool realIsDouble(const OpenMM::ComputeContext& context) {
     return context.getUseDoublePrecision();
@@ -62,11 +69,20 @@ private:
     void set(int index, const OpenMM::mm_int4& value) { kernel->setArg(index, value); }
     void set(int index, const Real& real) { setNumber(index, real.value, realIsDouble(*context)); }
     void set(int index, const Mixed& m) { setNumber(index, m.value, mixedIsDouble(*context)); }
+    void set(int index, const Real4& v) { setVector(index, v, realIsDouble(*context)); }
+    void set(int index, const Mixed4& v) { setVector(index, v, mixedIsDouble(*context)); }
     void setNumber(int index, double value, bool isDouble) {
         if (isDouble)
             kernel->setArg(index, value);
         else
             kernel->setArg(index, static_cast<float>(value));
+    }
+    template <class Vector> void setVector(int index, const Vector& v, bool isDouble) {
+        if (isDouble)
+            kernel->setArg(index, OpenMM::mm_double4(v.x, v.y, v.z, v.w));
+        else
+            kernel->setArg(index,
+                           OpenMM::mm_float4(float(v.x), float(v.y), float(v.z), float(v.w)));
     }
 
     OpenMM::ComputeContext* context = nullptr;

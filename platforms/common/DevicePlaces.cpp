@@ -25,13 +25,17 @@ class KeyTrait : public ComputeSortImpl::SortTrait {
     const char* getSortKey() const override { return "value"; }
 };
 
+/** Not many more than particles: an empty cell costs as much as a particle. */
+int mostCells(int particles) {
+    return 2 * particles + 1;
+}
+
 /**
- * Columns of cells about as wide as the range; not many more cells than particles, and no first
- * cell.
+ * Columns of cells about as wide as the range, at most mostCells() of them, and no first cell.
  */
 mm_int4 cellsFor(const numerics::Lattice& box, double range, int particles) {
     int count[3];
-    const int most = 2 * particles + 1;
+    const int most = mostCells(particles);
     for (int d = 0; d < 3; d++) {
         const double cells = (d < 2 ? 1 : CELLS_PER_RANGE) * box.width(d) / range;
         count[d] = std::max(1, static_cast<int>(std::min(cells, double(most))));
@@ -63,7 +67,6 @@ DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::v
         placeInOrder = DeviceKernel(context, program, "placeInOrder");
         return;
     }
-    chooseCells(box, range);
     std::vector<int> ranks(particles, -1);
     for (int i = 0; i < numMobile; i++)
         ranks[mobile[i]] = i;
@@ -71,12 +74,8 @@ DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::v
     rankOf.upload(ranks);
     located.initialize(context, particles, fraction4Size, "pseLocated");
     keys.initialize<uint64_t>(context, numMobile + 1, "pseKeys");
-    cellStart.initialize<int>(context, numCells + 1, "pseCellStart");
-    const numerics::Matrix3 inverse = box.vectors().inverse();
-    uploadMixed(
-        inverseBox, context,
-        {inverse(0, 0), inverse(0, 1), inverse(1, 1), inverse(0, 2), inverse(1, 2), inverse(2, 2)},
-        "pseInverseBox");
+    prepareCells();
+    setBox(box, range);
     // Positions may be clustered, so not the sort for uniform keys. The other one guesses the
     // distribution from a few keys, the first among them, and does not bear one far below its guess
     // (what it converts to unsigned is negative then): a first key of zero leaves nothing below.
@@ -86,22 +85,41 @@ DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::v
     findCells = DeviceKernel(context, program, "findCells");
 }
 
-void DevicePlaces::chooseCells(const numerics::Lattice& box, double range) {
+/** Room for the cells of every box. */
+void DevicePlaces::prepareCells() {
+    int most = 0;
+    if (sizeGroups) {
+        for (const SizeGroups::Group& group : sizeGroups->groups)
+            most += mostCells(group.count);
+        cellsOfGroups.initialize<mm_int4>(context, sizeGroups->size(), "pseGroupCells");
+        groupOf.initialize<int>(context, numMobile, "pseGroupOf");
+        groupOf.upload(sizeGroups->groupOf);
+    } else
+        most = mostCells(numMobile);
+    cellStart.initialize<int>(context, most + 1, "pseCellStart");
+}
+
+void DevicePlaces::setBox(const numerics::Lattice& box, double range) {
+    inverseBox = box.vectors().inverse();
     if (!sizeGroups) {
         cellCount = cellsFor(box, range, numMobile);
         numCells = cellCount.x * cellCount.y * cellCount.z;
         return;
     }
     std::vector<mm_int4> cells;
+    numCells = 0;
     for (const SizeGroups::Group& group : sizeGroups->groups) {
         cells.push_back(cellsFor(box, group.range, group.count));
         cells.back().w = numCells;
         numCells += cells.back().x * cells.back().y * cells.back().z;
     }
-    cellsOfGroups.initialize<mm_int4>(context, cells.size(), "pseGroupCells");
+    const auto equal = [](const mm_int4& a, const mm_int4& b) {
+        return a.x == b.x && a.y == b.y && a.z == b.z && a.w == b.w;
+    };
+    if (std::equal(cells.begin(), cells.end(), cellsInUse.begin(), cellsInUse.end(), equal))
+        return; // as in most steps of a box that moves: nothing to wait for
     cellsOfGroups.upload(cells);
-    groupOf.initialize<int>(context, numMobile, "pseGroupOf");
-    groupOf.upload(sizeGroups->groupOf);
+    cellsInUse = cells;
 }
 
 void DevicePlaces::update() {
@@ -112,14 +130,18 @@ void DevicePlaces::update() {
 }
 
 void DevicePlaces::sortByCells() {
-    const auto locate = [this](auto&&... cells) {
+    const numerics::Matrix3& v = inverseBox;
+    const Mixed4 inverseX = {v(0, 0), v(0, 1), v(0, 2), 0};
+    const Mixed4 inverseYZ = {v(1, 1), v(1, 2), v(2, 2), 0};
+    const auto locate = [&](auto&&... cells) {
         if (context.getUseMixedPrecision())
             locateParticles(numParticles, numParticles, cells..., context.getPosq(),
-                            context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf,
-                            context.getPosqCorrection());
+                            context.getAtomIndexArray(), rankOf, inverseX, inverseYZ, located, keys,
+                            slotOf, context.getPosqCorrection());
         else
             locateParticles(numParticles, numParticles, cells..., context.getPosq(),
-                            context.getAtomIndexArray(), rankOf, inverseBox, located, keys, slotOf);
+                            context.getAtomIndexArray(), rankOf, inverseX, inverseYZ, located, keys,
+                            slotOf);
     };
     if (sizeGroups)
         locate(groupOf, cellsOfGroups);

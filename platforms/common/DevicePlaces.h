@@ -30,6 +30,8 @@ public:
     DevicePlaces(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
                  const numerics::Lattice& box, double range, StepSummary& summary,
                  std::shared_ptr<const SizeGroups> sizes = nullptr);
+    /** As if made for that box; no memory is asked for. */
+    void setBox(const numerics::Lattice& box, double range);
     /** Follow the positions of the Context. */
     void update();
 
@@ -45,7 +47,7 @@ public:
     std::vector<int> particles() const;
 
 private:
-    void chooseCells(const numerics::Lattice& box, double range);
+    void prepareCells();
     void sortByCells();
     void keepOrder();
 
@@ -54,9 +56,11 @@ private:
     int numParticles, numMobile;
     bool inCells;
     int numCells = 0; ///< of all groups
+    std::vector<OpenMM::mm_int4> cellsInUse;
+    numerics::Matrix3 inverseBox;
     std::shared_ptr<const SizeGroups> sizeGroups;
     OpenMM::mm_int4 cellCount = {1, 1, 1, 0};
-    OpenMM::ComputeArray rankOf, particleAt, inverseBox, located, keys, slotOf;
+    OpenMM::ComputeArray rankOf, particleAt, located, keys, slotOf;
     OpenMM::ComputeArray placeArray, slotAt, cellStart, groupOf, cellsOfGroups;
     OpenMM::ComputeSort sort;
     DeviceKernel locateParticles, placeParticles, findCells, findSlots, placeInOrder;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "DeviceRealSpace.h"
-#include "DeviceGeometry.h"
 #include "numerics/Lanczos.h"
 #include "numerics/RealTable.h"
 #include "numerics/Rpy.h"
@@ -42,12 +41,12 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
       // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
       lanczos(this->context, places, summary, plan.lanczosTolerance,
               std::max(2 * plan.predictedError, 1e-10), LanczosTridiagonal::REAL_HALF),
-      sumImages(plan.sumImages) {
+      sumImages(plan.sumImages), geometry(programs, "pseGeometry") {
     Defines defines = DeviceLanczos::defines(LanczosTridiagonal::REAL_HALF);
     defines["SMALLEST_R2"] = context.doubleToString(SMALLEST_R2);
     if (sumImages)
         defines["SUM_IMAGES"] = "1";
-    else if (isTilted(box))
+    else if (mayBeTilted(context, plan, box))
         defines["TILTED"] = "1";
     if (spheres != nullptr)
         sphereRows.reset(
@@ -72,7 +71,8 @@ ComputeProgram DeviceRealSpace::prepareRows(DevicePrograms& programs, const Plan
     appendCoefficients(table.F, values);
     appendCoefficients(table.C, values);
     uploadReals(tables, context, values, "pseTables");
-    prepareGeometry(plan, box);
+    self = table.self;
+    setBox(plan, box);
     counts.initialize<int>(context, n, "pseCounts");
 
     using c = RpyCoefficients;
@@ -94,15 +94,18 @@ ComputeProgram DeviceRealSpace::prepareRows(DevicePrograms& programs, const Plan
 }
 
 /** What realSpace.cc calls geometry, in that order; the images of the box, if they are summed. */
-void DeviceRealSpace::prepareGeometry(const Plan& plan, const Lattice& box) {
+void DeviceRealSpace::setBox(const Plan& plan, const Lattice& box) {
+    if (sphereRows) {
+        sphereRows->setBox(plan, box);
+        return;
+    }
     const double rc = plan.realCutoff / plan.a;
     std::vector<double> values = geometryOf(context, box, plan.a);
-    values.insert(values.end(),
-                  {rc * rc, 2 / (rc * rc), makeRealTable(*plan.split, rc, plan.tableError).self});
+    values.insert(values.end(), {rc * rc, 2 / (rc * rc), self});
     for (int d = 0; d < 3; d++)
         values.push_back(
             std::min((1 + REACH_MARGIN) * plan.realCutoff / box.width(d) + REACH_MARGIN, 0.9));
-    uploadReals(geometry, context, values, "pseGeometry");
+    geometry.set(values);
     if (sumImages)
         numImages = uploadImages(images, context, box, plan.realCutoff, plan.a);
 }
@@ -116,11 +119,11 @@ void DeviceRealSpace::findNeighbours() {
     const int entry = sumImages ? sizeof(mm_int2) : sizeof(int);
     neighbours.reserve(context, size_t(capacity) * n, entry, "pseNeighbours");
     if (sumImages)
-        findKernel(n, n, capacity, numImages, places.places(), images, geometry, *neighbours,
-                   counts, summary.maxima());
-    else
-        findKernel(n, n, capacity, places.cells(), places.places(), places.cellStarts(), geometry,
+        findKernel(n, n, capacity, numImages, places.places(), *images, geometry.array(),
                    *neighbours, counts, summary.maxima());
+    else
+        findKernel(n, n, capacity, places.cells(), places.places(), places.cellStarts(),
+                   geometry.array(), *neighbours, counts, summary.maxima());
 }
 
 bool DeviceRealSpace::hadRoom() {
@@ -140,10 +143,10 @@ void DeviceRealSpace::withMatrix(DeviceKernel& kernel, Arguments&&... arguments)
     if (sphereRows)
         sphereRows->withMatrix(kernel, arguments...);
     else if (sumImages)
-        kernel(n, n, planConstants, places.places(), images, *neighbours, counts, geometry, tables,
-               arguments...);
+        kernel(n, n, planConstants, places.places(), *images, *neighbours, counts, geometry.array(),
+               tables, arguments...);
     else
-        kernel(n, n, planConstants, places.places(), *neighbours, counts, geometry, tables,
+        kernel(n, n, planConstants, places.places(), *neighbours, counts, geometry.array(), tables,
                arguments...);
 }
 

@@ -2,6 +2,7 @@
 #ifndef OPENMMPSE_DEVICEREALSPACE_H_
 #define OPENMMPSE_DEVICEREALSPACE_H_
 
+#include "DeviceGeometry.h"
 #include "DeviceLanczos.h"
 #include "DevicePrograms.h"
 #include "DeviceSphereRows.h"
@@ -24,6 +25,8 @@ public:
     /** Basis vectors of ten iterations, places, forces and velocities. */
     static double bytesPerParticle(int realSize);
 
+    /** As if made for that box. */
+    void setBox(const numerics::Plan& plan, const numerics::Lattice& box);
     void findNeighbours();
     /** Whether all neighbours found room, as the summary says; if not, there is room next time. */
     bool hadRoom();
@@ -37,7 +40,6 @@ public:
 private:
     OpenMM::ComputeProgram prepareRows(DevicePrograms& programs, const numerics::Plan& plan,
                                        const numerics::Lattice& box, Defines defines);
-    void prepareGeometry(const numerics::Plan& plan, const numerics::Lattice& box);
     template <class... Arguments> void withMatrix(DeviceKernel& kernel, Arguments&&... arguments);
 
     OpenMM::ComputeContext& context;
@@ -47,8 +49,10 @@ private:
     bool sumImages;
     int numImages = 0, capacity = 0;
     std::unique_ptr<DeviceSphereRows> sphereRows; ///< in place of the rows of equal spheres
-    OpenMM::ComputeArray planConstants, geometry, tables, images, counts;
-    GrowingArray neighbours;
+    double self = 0;                              ///< of equal spheres: the diagonal of M_R
+    DeviceNumbers geometry;
+    OpenMM::ComputeArray planConstants, tables, counts;
+    GrowingArray neighbours, images;
     DeviceKernel findKernel, multiplyReal;
 };
 

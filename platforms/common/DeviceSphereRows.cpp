@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "DeviceSphereRows.h"
-#include "DeviceGeometry.h"
 #include "numerics/MixtureTable.h"
 
 using namespace OpenMM;
@@ -25,7 +24,7 @@ DeviceSphereRows::DeviceSphereRows(DevicePrograms& programs, const Plan& plan, c
                                    DevicePlaces& places, DeviceSpheres& spheres,
                                    StepSummary& summary, Defines defines)
     : context(programs.context()), places(places), spheres(spheres), summary(summary),
-      sumImages(plan.sumImages) {
+      sumImages(plan.sumImages), geometry(programs, "pseGeometry") {
     const SizeGroups& sizes = *places.sizes();
     std::vector<double> largest;
     for (int g = 0; g < sizes.size(); g++) {
@@ -40,17 +39,21 @@ DeviceSphereRows::DeviceSphereRows(DevicePrograms& programs, const Plan& plan, c
     defines["MIXTURE"] = "1";
     prepareTables(plan, defines, constants);
     uploadConstants(planConstants, context, constants);
+    setBox(plan, box);
+    compiled = programs.realSpace(defines, constants);
+    findSpheres = DeviceKernel(context, compiled, "findSpheres");
+    evaluatePairs = DeviceKernel(context, compiled, "evaluatePairs");
+}
+
+void DeviceSphereRows::setBox(const Plan& plan, const Lattice& box) {
     std::vector<double> values = geometryOf(context, box, plan.a);
     const double rc = plan.mixture->largestRange();
     values.insert(values.end(), {plan.mixture->shape().range(), 2 / (rc * rc)});
     for (int d = 0; d < 3; d++)
         values.push_back(plan.a / box.width(d));
-    uploadReals(geometry, context, values, "pseGeometry");
+    geometry.set(values);
     if (sumImages)
         numImages = uploadImages(images, context, box, plan.realCutoff, plan.a);
-    compiled = programs.realSpace(defines, constants);
-    findSpheres = DeviceKernel(context, compiled, "findSpheres");
-    evaluatePairs = DeviceKernel(context, compiled, "evaluatePairs");
 }
 
 /** The wave part of pairs, and the diagonal. */
@@ -117,19 +120,19 @@ void DeviceSphereRows::find() {
     pairs.reserve(context, entries, 2 * realSize(context), "psePairs");
     const auto evaluate = [&](auto&... last) {
         if (sumImages)
-            evaluatePairs(n, n, groups, planConstants, groupRows, places.places(), images,
-                          spheres.radii(), spheres.kinds(), *neighbours, counts, geometry, tables,
-                          last...);
+            evaluatePairs(n, n, groups, planConstants, groupRows, places.places(), *images,
+                          spheres.radii(), spheres.kinds(), *neighbours, counts, geometry.array(),
+                          tables, last...);
         else
             evaluatePairs(n, n, groups, planConstants, groupRows, places.places(), spheres.radii(),
-                          spheres.kinds(), *neighbours, counts, geometry, tables, last...);
+                          spheres.kinds(), *neighbours, counts, geometry.array(), tables, last...);
     };
     if (sumImages)
-        findSpheres(n, n, groups, numImages, images, groupRows, places.places(), spheres.radii(),
-                    geometry, *neighbours, counts, summary.maxima());
+        findSpheres(n, n, groups, numImages, *images, groupRows, places.places(), spheres.radii(),
+                    geometry.array(), *neighbours, counts, summary.maxima());
     else
         findSpheres(n, n, groups, places.groupCells(), places.cellStarts(), groupRadii, groupRows,
-                    places.places(), spheres.radii(), geometry, *neighbours, counts,
+                    places.places(), spheres.radii(), geometry.array(), *neighbours, counts,
                     summary.maxima());
     if (interpolates)
         evaluate(weights, *pairs);

@@ -2,6 +2,7 @@
 #ifndef OPENMMPSE_DEVICESPHEREROWS_H_
 #define OPENMMPSE_DEVICESPHEREROWS_H_
 
+#include "DeviceGeometry.h"
 #include "DeviceSpheres.h"
 #include "StepSummary.h"
 
@@ -21,6 +22,8 @@ public:
                                    int realSize);
 
     OpenMM::ComputeProgram program() const { return compiled; }
+    /** As if made for that box. */
+    void setBox(const numerics::Plan& plan, const numerics::Lattice& box);
     void find();
     /** Whether all neighbours found room, as the summary says; if not, there is room next time. */
     bool hadRoom();
@@ -28,11 +31,11 @@ public:
     template <class... Arguments> void withMatrix(DeviceKernel& kernel, Arguments&&... arguments) {
         const int n = places.count(), groups = places.sizes()->size();
         if (sumImages)
-            kernel(n, n, groups, groupRows, places.places(), images, spheres.kinds(), selves,
-                   *neighbours, counts, *pairs, geometry, arguments...);
+            kernel(n, n, groups, groupRows, places.places(), *images, spheres.kinds(), selves,
+                   *neighbours, counts, *pairs, geometry.array(), arguments...);
         else
             kernel(n, n, groups, groupRows, places.places(), spheres.kinds(), selves, *neighbours,
-                   counts, *pairs, geometry, arguments...);
+                   counts, *pairs, geometry.array(), arguments...);
     }
 
 private:
@@ -48,9 +51,9 @@ private:
     std::vector<double> capacities; ///< length of the rows of each group
     size_t entries = 0;             ///< of all rows, 0 before they have their places
     OpenMM::ComputeProgram compiled;
-    OpenMM::ComputeArray planConstants, geometry, images, groupRows, groupRadii, counts, tables,
-        weights, selves;
-    GrowingArray neighbours, pairs;
+    DeviceNumbers geometry;
+    OpenMM::ComputeArray planConstants, groupRows, groupRadii, counts, tables, weights, selves;
+    GrowingArray neighbours, pairs, images;
     DeviceKernel findSpheres, evaluatePairs;
 };
 

@@ -23,12 +23,8 @@ DeviceSphereSpread::DeviceSphereSpread(DevicePrograms& programs, const Plan& pla
                                        const Lattice& box, DevicePlaces& places,
                                        DeviceSpheres& spheres)
     : context(programs.context()), places(places), spheres(spheres),
-      size(plan.grid[0], plan.grid[1], plan.grid[2], 0) {
-    const GridMetric m(box, plan.grid, plan.a);
-    uploadReals(metric, context,
-                {m.plane, m.line, m.point, m.skewY, m.skewX, m.skewZ, m.pointsPerLength[0],
-                 m.pointsPerLength[1], m.pointsPerLength[2]},
-                "pseMetric");
+      size(plan.grid[0], plan.grid[1], plan.grid[2], 0), metric(programs, "pseMetric") {
+    setBox(plan, box);
     std::vector<double> reach;
     for (const SizeGroups::Group& group : places.sizes()->groups)
         reach.push_back(windowOf(plan).reach(group.largest));
@@ -39,6 +35,12 @@ DeviceSphereSpread::DeviceSphereSpread(DevicePrograms& programs, const Plan& pla
     compiled = programs.sphereSpread(constants);
     spreadSpheres = DeviceKernel(context, compiled, "spreadSpheres");
     gatherSpheres = DeviceKernel(context, compiled, "gatherSpheres");
+}
+
+void DeviceSphereSpread::setBox(const Plan& plan, const Lattice& box) {
+    const GridMetric m(box, plan.grid, plan.a);
+    metric.set({m.plane, m.line, m.point, m.skewY, m.skewX, m.skewZ, m.pointsPerLength[0],
+                m.pointsPerLength[1], m.pointsPerLength[2]});
 }
 
 double DeviceSphereSpread::bytesPerParticle(const Plan& plan, int realSize) {
@@ -74,12 +76,14 @@ int DeviceSphereSpread::makeShapes(const Plan& plan) {
 void DeviceSphereSpread::spread(ComputeArray& f, ComputeArray grids[3]) {
     spreadSpheres(context.getNumThreadBlocks() * GROUP_SIZE, size, places.sizes()->size(),
                   planConstants, places.groupCells(), reaches, places.cellStarts(), places.places(),
-                  spheres.kinds(), shapes, coefficients, metric, f, grids[0], grids[1], grids[2]);
+                  spheres.kinds(), shapes, coefficients, metric.array(), f, grids[0], grids[1],
+                  grids[2]);
 }
 
 void DeviceSphereSpread::gather(ComputeArray grids[3], ComputeArray& u) {
     gatherSpheres(LANES * places.count(), places.count(), size, planConstants, places.places(),
-                  spheres.kinds(), shapes, coefficients, metric, grids[0], grids[1], grids[2], u);
+                  spheres.kinds(), shapes, coefficients, metric.array(), grids[0], grids[1],
+                  grids[2], u);
 }
 
 } // namespace PSE

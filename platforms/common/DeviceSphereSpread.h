@@ -2,6 +2,7 @@
 #ifndef OPENMMPSE_DEVICESPHERESPREAD_H_
 #define OPENMMPSE_DEVICESPHERESPREAD_H_
 
+#include "DeviceGeometry.h"
 #include "DeviceSpheres.h"
 
 namespace PSE {
@@ -17,6 +18,8 @@ public:
     static double bytesPerParticle(const numerics::Plan& plan, int realSize);
     /** Kernels of the waves, which are those of all Plans. */
     OpenMM::ComputeProgram program() const { return compiled; }
+    /** As if made for that box. */
+    void setBox(const numerics::Plan& plan, const numerics::Lattice& box);
     /** grids = forces, spread */
     void spread(OpenMM::ComputeArray& f, OpenMM::ComputeArray grids[3]);
     /** u += what the grids hold at the spheres */
@@ -30,7 +33,8 @@ private:
     DeviceSpheres& spheres;
     OpenMM::mm_int4 size;
     OpenMM::ComputeProgram compiled;
-    OpenMM::ComputeArray planConstants, metric, reaches, shapes, coefficients;
+    DeviceNumbers metric;
+    OpenMM::ComputeArray planConstants, reaches, shapes, coefficients;
     DeviceKernel spreadSpheres, gatherSpheres;
 };
 

@@ -2,7 +2,6 @@
 #include "DeviceWaveSpace.h"
 #include "DevicePrograms.h"
 #include "DeviceRealSpace.h"
-#include "numerics/WaveFactors.h"
 #include "numerics/Window.h"
 
 using namespace OpenMM;
@@ -17,6 +16,13 @@ int lanesFor(int support) {
     return support <= 4 ? 4 : (support <= 8 ? 8 : 16);
 }
 
+std::vector<double> rowByRow(const Matrix3& m) {
+    std::vector<double> entries;
+    for (int i = 0; i < 9; i++)
+        entries.push_back(m(i / 3, i % 3));
+    return entries;
+}
+
 /** Points of a half-complex grid. */
 size_t numModes(const mm_int4& size) {
     return size_t(size.x) * size.y * (size.z / 2 + 1);
@@ -28,7 +34,7 @@ DeviceWaveSpace::DeviceWaveSpace(DevicePrograms& programs, const Plan& plan, con
                                  DevicePlaces& places, DeviceSpheres* spheres)
     : context(programs.context()), places(places),
       size(plan.grid[0], plan.grid[1], plan.grid[2], 0), support(plan.windowSupport),
-      lanes(lanesFor(plan.windowSupport)) {
+      lanes(lanesFor(plan.windowSupport)), waves(programs, "pseWaves") {
     if (spheres != nullptr)
         sphereSpread.reset(new DeviceSphereSpread(programs, plan, box, places, *spheres));
     // The transform uses its input as workspace: both need room for complex numbers.
@@ -37,9 +43,14 @@ DeviceWaveSpace::DeviceWaveSpace(DevicePrograms& programs, const Plan& plan, con
         modes[c].initialize(context, numModes(size), 2 * realSize(context), "pseModes");
     }
     fft = programs.transform(plan.grid);
-    prepareFactors(plan, box);
     const ComputeProgram program =
         sphereSpread ? sphereSpread->program() : prepareWindow(programs, plan);
+    if (plan.moving) {
+        prepareMovingFactors(plan);
+        makeFactors = DeviceKernel(context, program, "makeFactors");
+        setBox(plan, box);
+    } else
+        prepareFactors(plan, box);
     scaleWaves = DeviceKernel(context, program, "scaleWaves");
 }
 
@@ -88,10 +99,35 @@ void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
                 values[(size_t(x) * size.y + y) * sizeZ + z] = exact(x, y, z);
     });
     uploadReals(factors, context, values, "pseFactors");
-    std::vector<double> vectors;
-    for (int i = 0; i < 9; i++)
-        vectors.push_back(exact.waves()(i / 3, i % 3));
-    uploadReals(waves, context, vectors, "pseWaves");
+    waves.set(rowByRow(exact.waves()));
+}
+
+void DeviceWaveSpace::prepareMovingFactors(const Plan& plan) {
+    moving.reset(new MovingWaveFactors(plan));
+    const std::vector<double>& powers = moving->weight.w.powers;
+    uploadReals(weightPowers, context, {powers.rbegin(), powers.rend()}, "pseWeightPowers");
+    std::vector<double> all;
+    for (const std::vector<double>& axis : moving->deconvolution)
+        all.insert(all.end(), axis.begin(), axis.end());
+    uploadReals(deconvolution, context, all, "pseDeconvolution");
+    factors.initialize(context, numModes(size), realSize(context), "pseFactors");
+}
+
+void DeviceWaveSpace::setBox(const Plan& plan, const Lattice& box) {
+    if (sphereSpread)
+        sphereSpread->setBox(plan, box);
+    waves.set(rowByRow(plan.a * box.waveVectors()));
+    scale = moving->scale(box);
+    factorsStale = true;
+}
+
+void DeviceWaveSpace::followBox(DeviceClock& clock) {
+    if (!factorsStale)
+        return;
+    makeFactors(static_cast<int>(numModes(size)), size, Real{scale}, Real{moving->weight.end2},
+                moving->weight.w.degree(), weightPowers, deconvolution, waves.array(), factors);
+    factorsStale = false;
+    clock.charge(MOVING_BOX);
 }
 
 void DeviceWaveSpace::evaluateWindows() {
@@ -121,6 +157,7 @@ void DeviceWaveSpace::gather(ComputeArray& u) {
 void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKey& key,
                                     ComputeArray& u, DeviceClock& clock) {
     const int all = context.getNumThreadBlocks() * GROUP_SIZE;
+    followBox(clock);
     if (f != NULL) {
         spread(*f);
         clock.charge("spreading");
@@ -128,8 +165,8 @@ void DeviceWaveSpace::addVelocities(ComputeArray* f, double noise, const NoiseKe
             fft->execFFT(grids[c], modes[c], true);
         clock.charge("Fourier transforms");
     }
-    scaleWaves(all, size, f != NULL ? 1 : 0, Real{noise}, kernelKey(key), waves, factors, modes[0],
-               modes[1], modes[2]);
+    scaleWaves(all, size, f != NULL ? 1 : 0, Real{noise}, kernelKey(key), waves.array(), factors,
+               modes[0], modes[1], modes[2]);
     clock.charge(noise != 0 ? "waves (noise and scaling)" : "waves (scaling)");
     for (int c = 0; c < 3; c++)
         fft->execFFT(modes[c], grids[c], false);

@@ -7,6 +7,7 @@
 #include "DeviceSphereSpread.h"
 #include "numerics/Noise.h"
 #include "numerics/Plan.h"
+#include "numerics/WaveFactors.h"
 
 namespace PSE {
 
@@ -25,6 +26,8 @@ public:
     static double bytesPerGridPoint(const numerics::Plan& plan, int realSize);
     static double bytesPerParticle(const numerics::Plan& plan, int realSize);
 
+    /** Follow a box that moves, with a Plan made for it. */
+    void setBox(const numerics::Plan& plan, const numerics::Lattice& box);
     /** Windows at the places as they are now. */
     void evaluateWindows();
     /**
@@ -40,16 +43,24 @@ private:
     void spread(OpenMM::ComputeArray& f);
     void gather(OpenMM::ComputeArray& u);
     void prepareFactors(const numerics::Plan& plan, const numerics::Lattice& box);
+    void prepareMovingFactors(const numerics::Plan& plan);
+    void followBox(DeviceClock& clock);
 
     OpenMM::ComputeContext& context;
     DevicePlaces& places;
     OpenMM::mm_int4 size;
     int support, lanes;
     std::unique_ptr<DeviceSphereSpread> sphereSpread; ///< in place of the window
-    OpenMM::ComputeArray planConstants, coefficients, starts, weights, factors, waves;
+    /// of a box that moves, else NULL: factors are then made on the device, when they are needed
+    std::unique_ptr<numerics::MovingWaveFactors> moving;
+    double scale = 0; ///< of the factors of a box that moves
+    bool factorsStale = false;
+    DeviceNumbers waves;
+    OpenMM::ComputeArray planConstants, coefficients, starts, weights, factors;
+    OpenMM::ComputeArray weightPowers, deconvolution;
     OpenMM::ComputeArray grids[3], modes[3];
     OpenMM::FFT3D fft;
-    DeviceKernel windowKernel, spreadForces, scaleWaves, gatherVelocities;
+    DeviceKernel windowKernel, spreadForces, makeFactors, scaleWaves, gatherVelocities;
 };
 
 } // namespace PSE

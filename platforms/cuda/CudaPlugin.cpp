@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "platforms/common/CommonStepKernel.h"
 #include "openmm/cuda/CudaContext.h"
+#include "openmm/cuda/CudaNonbondedUtilities.h"
 #include "openmm/KernelFactory.h"
 #include "openmm/cuda/CudaPlatform.h"
 #include "openmm/internal/ContextImpl.h"
@@ -17,7 +18,12 @@ public:
     KernelImpl* createKernelImpl(std::string name, const Platform& platform,
                                  ContextImpl& context) const override {
         auto& data = *static_cast<CudaPlatform::PlatformData*>(context.getPlatformData());
-        return new CommonStepKernel(name, platform, *data.contexts[0], int(data.contexts.size()));
+        CudaContext& device = *data.contexts[0];
+        // said once more, what is listed by whom; OpenMM then lists it anew
+        const auto forgetLists = [&device] {
+            device.getNonbondedUtilities().setAtomBlockRange(0, 1);
+        };
+        return new CommonStepKernel(name, platform, device, int(data.contexts.size()), forgetLists);
     }
 };
 

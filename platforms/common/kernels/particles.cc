@@ -15,6 +15,8 @@
  * Where all particles are, and sorting keys of those that move.
  * @param rankOf   number of a particle among those that move, negative for one that does not
  * @param groupOf  by that number
+ * @param inverseX, inverseYZ  the inverse of the box, a triangle: its first row; of the second y and
+ * z, of the third z
  */
 KERNEL void locateParticles(int numAtoms,
 #ifdef SIZE_GROUPS
@@ -24,7 +26,7 @@ KERNEL void locateParticles(int numAtoms,
 #endif
         GLOBAL const real4* RESTRICT posq,
         GLOBAL const int* RESTRICT atomIndex, GLOBAL const int* RESTRICT rankOf,
-        GLOBAL const mixed* RESTRICT inverseBox, GLOBAL fraction4* RESTRICT located,
+        mixed4 inverseX, mixed4 inverseYZ, GLOBAL fraction4* RESTRICT located,
         GLOBAL mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT slotOf
 #ifdef USE_MIXED_PRECISION
         , GLOBAL const real4* RESTRICT posqCorrection
@@ -41,9 +43,9 @@ KERNEL void locateParticles(int numAtoms,
 #endif
         const int particle = atomIndex[slot];
         fraction4 s;
-        s.x = toFraction(inverseBox[0]*x+inverseBox[1]*y+inverseBox[3]*z);
-        s.y = toFraction(inverseBox[2]*y+inverseBox[4]*z);
-        s.z = toFraction(inverseBox[5]*z);
+        s.x = toFraction(inverseX.x*x+inverseX.y*y+inverseX.z*z);
+        s.y = toFraction(inverseYZ.x*y+inverseYZ.y*z);
+        s.z = toFraction(inverseYZ.z*z);
         s.w = particle;
         located[slot] = s;
         slotOf[particle] = slot;
@@ -233,6 +235,54 @@ KERNEL void moveParticles(int n, mixed dt, mixed unit, GLOBAL const int* RESTRIC
         p.z += dt*velocity.z;
 #endif
         posq[slot] = p;
+    }
+}
+
+/**
+ * After a step of dt: undisturbed flow carries particles by strain y, y that of the beginning of the
+ * step [T35]. What does not move stays where the Context says it is, although its image tilts with
+ * the box.
+ * @param lifts  by slot, how far above the particle the image is that OpenMM keeps (nm)
+ */
+KERNEL void carryAlong(int numAtoms, mixed strain, mixed dt, GLOBAL const mixed* RESTRICT lifts,
+        GLOBAL real4* RESTRICT posq, GLOBAL mixed4* RESTRICT velm
+#ifdef USE_MIXED_PRECISION
+        , GLOBAL real4* RESTRICT posqCorrection
+#endif
+        ) {
+    for (int slot = GLOBAL_ID; slot < numAtoms; slot += GLOBAL_SIZE) {
+        real4 p = posq[slot];
+        mixed x = p.x, y = p.y;
+#ifdef USE_MIXED_PRECISION
+        real4 rest = posqCorrection[slot];
+        x += rest.x;
+        y += rest.y;
+#endif
+        mixed4 velocity = velm[slot];
+        mixed height = lifts[slot];
+        if (velocity.w != 0) { // it has a mass
+            const mixed before = y-dt*velocity.y;
+            velocity.x += strain/dt*(before-height);
+            velm[slot] = velocity;
+            height = before;
+        }
+        x += strain*height;
+        p.x = (real) x;
+#ifdef USE_MIXED_PRECISION
+        rest.x = (real) (x-p.x);
+        posqCorrection[slot] = rest;
+#endif
+        posq[slot] = p;
+    }
+}
+
+/** Numbers that the host changes between launches without waiting for the device. */
+KERNEL void setNumbers(GLOBAL real4* RESTRICT numbers, real4 a, real4 b, real4 c, real4 d) {
+    if (GLOBAL_ID == 0) {
+        numbers[0] = a;
+        numbers[1] = b;
+        numbers[2] = c;
+        numbers[3] = d;
     }
 }
 

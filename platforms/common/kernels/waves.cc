@@ -49,6 +49,34 @@ DEVICE int waveNumber(int i, int count) {
 }
 
 /**
+ * D of a box that moves [T36]: scale w(k^2)/k^2 times what belongs to each axis.
+ * @param end2           k^2 from which on w = 0
+ * @param powers         of w in t = 2 k^2/end2 - 1, highest first
+ * @param deconvolution  of x, then of y, then of z up to half of the grid
+ */
+KERNEL void makeFactors(int4 size, real scale, real end2, int degree, GLOBAL const real* RESTRICT powers,
+        GLOBAL const real* RESTRICT deconvolution, GLOBAL const real* RESTRICT waves, GLOBAL real* RESTRICT factors) {
+    const int sizeZ = size.z/2+1, modes = size.x*size.y*sizeZ;
+    for (int i = GLOBAL_ID; i < modes; i += GLOBAL_SIZE) {
+        const int x = i/(size.y*sizeZ), y = i/sizeZ%size.y, nz = i%sizeZ;
+        const int nx = waveNumber(x, size.x), ny = waveNumber(y, size.y);
+        const real kx = waves[0]*nx+waves[1]*ny+waves[2]*nz, ky = waves[3]*nx+waves[4]*ny+waves[5]*nz,
+                kz = waves[6]*nx+waves[7]*ny+waves[8]*nz;
+        const real k2 = kx*kx+ky*ky+kz*kz;
+        real D = 0;
+        if (k2 > 0 && k2 < end2) {
+            const real t = 2*k2/end2-1;
+            real w = powers[0];
+            for (int power = 1; power <= degree; power++)
+                w = w*t+powers[power];
+            if (w > 0)
+                D = scale*w/k2*deconvolution[x]*deconvolution[size.x+y]*deconvolution[size.x+size.y+nz];
+        }
+        factors[i] = D;
+    }
+}
+
+/**
  * Gridded forces to gridded velocities, in place, thermal part included [T6, T9]:
  *
  *     u(k) = forced D Q f(k) + noise sqrt(D) Q z(k),   Q = I - k k^T/k^2
