@@ -14,7 +14,9 @@ namespace PSE::numerics {
 /** How the small side works, and the words of its refusals. */
 struct LanczosKind {
     int mostIterations;
-    bool many; ///< iterations: T^{1/2} e_1 by a method whose cost is linear in their number
+    /// iterations: T^{1/2} e_1 by a method whose cost is linear in their number, and vectors made
+    /// orthogonal to all earlier ones in every precision
+    bool many;
     const char *mobility, *remedy;
 };
 
@@ -87,7 +89,8 @@ private:
  * with sums accumulated in double.
  *
  * @param small            its tridiagonal side, new
- * @param reorthogonalise  against all earlier basis vectors: needed for errors near rounding
+ * @param reorthogonalise  against all earlier basis vectors: needed for errors near rounding, and
+ * where there are many iterations
  * @return number of iterations
  */
 template <class Space>

@@ -30,6 +30,12 @@ inline double secondOrder(SphereModel model) {
     return model == SphereModel::ForceCoupling ? M_PI : 3.0;
 }
 
+/** The pair tensor of spheres of any radii in infinite fluid, r >= 0. */
+inline PairScalars totalScalars(SphereModel model, double r, double ai, double aj) {
+    return model == SphereModel::ForceCoupling ? forceCouplingScalars(r, ai, aj)
+                                               : rpyScalars(r, ai, aj);
+}
+
 /** The pair tensor in infinite fluid, r >= 0. */
 inline PairScalars totalScalars(SphereModel model, double r) {
     return model == SphereModel::ForceCoupling ? forceCouplingScalars(r, 1, 1) : rpyScalars(r);

@@ -171,7 +171,7 @@ PSE_GETTER_DOC(getMobilityModel, int, Get the mobility model.,
     RotnePragerYamakawa or ForceCoupling or FreeDraining)
 PSE_SETTER_DOC(setMobilityModel, model, int, Set the mobility model. Default RotnePragerYamakawa.,
     PSEBrownianIntegrator.RotnePragerYamakawa or .ForceCoupling (Gaussian envelopes of width
-    a/sqrt(pi); one radius for all) or .FreeDraining (no hydrodynamics),
+    a/sqrt(pi); in a periodic fluid one radius for all) or .FreeDraining (no hydrodynamics),
     if it is none of these or a Context exists)
 PSE_GETTER_DOC(getFluidBoundary, int, Get what surrounds the particles.,
     Automatic or Periodic or Unbounded)

@@ -4,6 +4,7 @@
 
 #include "PairOracle.h"
 #include "numerics/AllWaves.h"
+#include "numerics/GaussianPairs.h"
 #include "numerics/ProlateSplit.h"
 #include "numerics/RealTable.h"
 #include <Eigen/Eigenvalues>
@@ -58,6 +59,32 @@ TEST(ForceCoupling, ScalarsAreTheIntegralOverAllWaves) {
             EXPECT_EQ(pair.F, s.F);
             EXPECT_NEAR(pair.G * size, (exact.F + r * r * exact.C) * size, 1e-14);
         }
+}
+
+/** Loops over many pairs evaluate them without a branch: the polynomials against the closed form.
+ */
+TEST(ForceCoupling, PolynomialsOfManyPairsAreTheClosedForm) {
+    const auto horner = [](const std::vector<double>& powers, double t) {
+        double sum = 0;
+        for (size_t n = powers.size(); n-- > 0;)
+            sum = sum * t + powers[n];
+        return sum;
+    };
+    for (double error : {1e-3, 5e-8, 1e-13}) {
+        const GaussianPairs pairs = gaussianPairs(error);
+        EXPECT_LE(pairs.F.size(), error < 1e-10 ? 50u : 20u);
+        const double allowed = error + 1e-14; // and the closed form's own
+        for (const auto& a : RADII)
+            for (double share = 0; share < 1e4; share = 1.07 * share + 0.01) {
+                const double D2 = a[0] * a[0] + a[1] * a[1], r = share * std::sqrt(D2),
+                             s = 1 / std::sqrt(D2 + GaussianPairs::SPREAD * r * r),
+                             t = 2 * D2 * s * s - 1;
+                const SmoothScalars exact = forceCouplingSmooth(r, a[0], a[1]);
+                EXPECT_NEAR(s * horner(pairs.F, t) / exact.F, 1, allowed) << error << " " << share;
+                EXPECT_NEAR(s * s * s * horner(pairs.C, t) / exact.C, 1, allowed)
+                    << error << " " << share;
+            }
+    }
 }
 
 TEST(ForceCoupling, SelfMobilityIsThatOfASphere) {

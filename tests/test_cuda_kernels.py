@@ -93,9 +93,15 @@ def recordScenes():
             runOnOpenCL(scene, precision, tolerance, lambda it: it.setFluidBoundary(unbounded))
         runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setFluidBoundary(unbounded))
         gaussian = PSEBrownianIntegrator.ForceCoupling
+        runOnOpenCL(suspensions[0], precision, 1e-3, unboundedGaussian)
         runOnOpenCL(suspensions[0], precision, 1e-2, lambda it: it.setMobilityModel(gaussian))
         freely = PSEBrownianIntegrator.FreeDraining
         runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setMobilityModel(freely))
+
+
+def unboundedGaussian(integrator):
+    integrator.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
+    integrator.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)
 
 
 def unequalSpheres():

@@ -70,11 +70,8 @@ bool equalRadii(const Scene& scene) {
     return true;
 }
 
-/** What force coupling cannot do yet where Rotne-Prager-Yamakawa can. */
+/** What force coupling cannot do in a periodic fluid where Rotne-Prager-Yamakawa can. */
 void checkForceCoupling(const Scene& scene) {
-    if (scene.unbounded)
-        refuse("setMobilityModel(ForceCoupling) in an unbounded fluid (" + scene.boundaryReason +
-               ") is not available; call setFluidBoundary(Periodic), or use RotnePragerYamakawa");
     for (size_t i = 0; i < scene.radii.size(); i++)
         if (scene.radii[i] != scene.radii[0]) {
             std::ostringstream message;
@@ -82,7 +79,7 @@ void checkForceCoupling(const Scene& scene) {
                     << scene.radii[i] << " nm, particle " << scene.mobile[0] << " has "
                     << scene.radii[0] << " nm, and unequal radii are not available with "
                     << "ForceCoupling in a periodic fluid; give all particles one radius, or use "
-                       "setMobilityModel(RotnePragerYamakawa)";
+                       "setMobilityModel(RotnePragerYamakawa) or setFluidBoundary(Unbounded)";
             refuse(message.str());
         }
 }
@@ -117,7 +114,7 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
     scene.forceCoupling = (model == PSEBrownianIntegrator::ForceCoupling);
     if (scene.hydrodynamics) {
         chooseBoundary(system, integrator, scene);
-        if (scene.forceCoupling)
+        if (scene.forceCoupling && !scene.unbounded)
             checkForceCoupling(scene);
         scene.modelReason = string(scene.forceCoupling ? "force coupling by Gaussian envelopes, "
                                                        : "Rotne-Prager-Yamakawa, ") +

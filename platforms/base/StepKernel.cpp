@@ -188,6 +188,8 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
 void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
     UnboundedRequest wanted = {integrator.getErrorTolerance(),
                                integrator.getRequestedNumericalParameters().lanczosTolerance};
+    if (scene.forceCoupling)
+        wanted.model = SphereModel::ForceCoupling;
     adapt(wanted);
     const UnboundedPlan made = makeUnboundedPlan(wanted, scene.radii);
     useUnbounded(made);

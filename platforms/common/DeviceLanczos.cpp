@@ -21,7 +21,8 @@ mm_int4 kernelKey(const NoiseKey& key) {
 DeviceLanczos::DeviceLanczos(ComputeContext& context, DevicePlaces& places, StepSummary& summary,
                              double tolerance, double negativeTolerance, const LanczosKind& kind)
     : context(context), places(places), summary(summary), tolerance(tolerance),
-      negativeTolerance(negativeTolerance), kind(kind), reorthogonalise(realIsDouble(context)) {
+      negativeTolerance(negativeTolerance), kind(kind),
+      reorthogonalise(realIsDouble(context) || kind.many) {
     if (reorthogonalise)
         overlaps.initialize(context, kind.mostIterations * groupsFor(context, places.count()),
                             mixedSize(context), "pseOverlaps");

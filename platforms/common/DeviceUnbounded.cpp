@@ -11,7 +11,15 @@ namespace PSE {
 namespace {
 
 /// in radii squared: below, pairs count as this far apart
-constexpr double SMALLEST_SINGLE = 1e-12, SMALLEST_DOUBLE = 1e-30;
+constexpr double SMALLEST_SINGLE = 1e-20, SMALLEST_DOUBLE = 1e-30;
+
+/** A polynomial in t by Horner's rule, as an expression: its numbers become immediates. */
+std::string expressionOf(const ComputeContext& context, const std::vector<double>& powers) {
+    std::string text;
+    for (size_t n = powers.size(); n-- > 0;)
+        text = context.doubleToString(powers[n]) + (text.empty() ? "" : "+t*(" + text + ")");
+    return "(" + text + ")";
+}
 
 Defines definesFor(const ComputeContext& context, const UnboundedPlan& plan) {
     using c = RpyCoefficients;
@@ -20,7 +28,11 @@ Defines definesFor(const ComputeContext& context, const UnboundedPlan& plan) {
         defines[name] = context.doubleToString(value);
     };
     define("SMALLEST_R2", realIsDouble(context) ? SMALLEST_DOUBLE : SMALLEST_SINGLE);
-    if (plan.equalRadii) {
+    if (plan.model == SphereModel::ForceCoupling) {
+        define("SPREAD", GaussianPairs::SPREAD);
+        defines["GAUSSIAN_F"] = expressionOf(context, plan.gaussian.F);
+        defines["GAUSSIAN_C"] = expressionOf(context, plan.gaussian.C);
+    } else if (plan.equalRadii) {
         defines["EQUAL_RADII"] = "1";
         define("CONTACT", c::CONTACT);
         define("APART_F1", c::APART_F1);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "AllPairsKernels.h"
+#include "numerics/GaussianPairs.h"
 #include "numerics/Rpy.h"
 #include <type_traits>
 
@@ -59,6 +60,33 @@ struct UnequalSpheres {
         r2 = hn::Max(r2, hn::Set(d, Real(SMALLEST_R2<Real>)));
         rpyOfUnequal(d, r2, inverseRoot(d, r2), hn::Set(d, p.radius[i]), hn::LoadU(d, p.radius + j),
                      F, C);
+    }
+};
+
+/** The force-coupling tensor of spheres of any radii, by the polynomials of GaussianPairs [T53]. */
+struct GaussianEnvelopes {
+    template <class D, class Real = hn::TFromD<D>>
+    HWY_INLINE void operator()(D d, const AllPairs<Real>& p, int i, int j, hn::Vec<D> r2,
+                               hn::Vec<D>& F, hn::Vec<D>& C) const {
+        const auto own = hn::Set(d, p.radius[i]), other = hn::LoadU(d, p.radius + j);
+        const auto squares = hn::MulAdd(own, own, hn::Mul(other, other));
+        const auto spread = hn::Set(d, Real(numerics::GaussianPairs::SPREAD));
+        const auto s = inverseRoot(d, hn::MulAdd(spread, r2, squares)), s2 = hn::Mul(s, s);
+        const auto t = hn::MulSub(hn::Add(squares, squares), s2, hn::Set(d, Real(1)));
+        // even and odd powers apart: four short chains of dependent operations instead of two
+        const auto t2 = hn::Mul(t, t);
+        const auto term = [&](const Real* all, int n) { return hn::Set(d, all[n]); };
+        int n = p.terms - 2;
+        auto evenF = term(p.gaussianF, n), oddF = term(p.gaussianF, n + 1),
+             evenC = term(p.gaussianC, n), oddC = term(p.gaussianC, n + 1);
+        for (n -= 2; n >= 0; n -= 2) {
+            evenF = hn::MulAdd(evenF, t2, term(p.gaussianF, n));
+            oddF = hn::MulAdd(oddF, t2, term(p.gaussianF, n + 1));
+            evenC = hn::MulAdd(evenC, t2, term(p.gaussianC, n));
+            oddC = hn::MulAdd(oddC, t2, term(p.gaussianC, n + 1));
+        }
+        F = hn::Mul(s, hn::MulAdd(oddF, t, evenF));
+        C = hn::Mul(hn::Mul(s, s2), hn::MulAdd(oddC, t, evenC));
     }
 };
 
@@ -182,12 +210,23 @@ template <class Law, class Real> AllPairsKernels<Real> kernelsOf() {
             addRowsAny<Law, Scalars::Replayed, Real>};
 }
 
-// Dispatch tables hold functions, not templates: one name per precision.
-AllPairsKernels<float> singleAllPairsKernels(bool equalRadii) {
-    return equalRadii ? kernelsOf<EqualSpheres, float>() : kernelsOf<UnequalSpheres, float>();
+template <class Real> AllPairsKernels<Real> kernelsFor(PairLaw law) {
+    switch (law) {
+    case PairLaw::EqualSpheres:
+        return kernelsOf<EqualSpheres, Real>();
+    case PairLaw::UnequalSpheres:
+        return kernelsOf<UnequalSpheres, Real>();
+    default:
+        return kernelsOf<GaussianEnvelopes, Real>();
+    }
 }
-AllPairsKernels<double> doubleAllPairsKernels(bool equalRadii) {
-    return equalRadii ? kernelsOf<EqualSpheres, double>() : kernelsOf<UnequalSpheres, double>();
+
+// Dispatch tables hold functions, not templates: one name per precision.
+AllPairsKernels<float> singleAllPairsKernels(PairLaw law) {
+    return kernelsFor<float>(law);
+}
+AllPairsKernels<double> doubleAllPairsKernels(PairLaw law) {
+    return kernelsFor<double>(law);
 }
 
 } // namespace HWY_NAMESPACE
@@ -200,11 +239,11 @@ namespace PSE {
 HWY_EXPORT(singleAllPairsKernels);
 HWY_EXPORT(doubleAllPairsKernels);
 
-template <> AllPairsKernels<float> allPairsKernels<float>(bool equalRadii) {
-    return HWY_DYNAMIC_DISPATCH(singleAllPairsKernels)(equalRadii);
+template <> AllPairsKernels<float> allPairsKernels<float>(PairLaw law) {
+    return HWY_DYNAMIC_DISPATCH(singleAllPairsKernels)(law);
 }
-template <> AllPairsKernels<double> allPairsKernels<double>(bool equalRadii) {
-    return HWY_DYNAMIC_DISPATCH(doubleAllPairsKernels)(equalRadii);
+template <> AllPairsKernels<double> allPairsKernels<double>(PairLaw law) {
+    return HWY_DYNAMIC_DISPATCH(doubleAllPairsKernels)(law);
 }
 
 } // namespace PSE

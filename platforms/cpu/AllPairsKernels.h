@@ -23,6 +23,16 @@ template <class Real> struct AllPairs {
     const Real *x, *y, *z;
     const Real *restX, *restY, *restZ;
     const Real* radius; ///< not read if all are 1
+    /// Of force coupling: [terms] each, GaussianPairs, an even number
+    const Real *gaussianF = nullptr, *gaussianC = nullptr;
+    int terms = 0;
+};
+
+/** What a pair of spheres is. */
+enum class PairLaw {
+    EqualSpheres,     ///< Rotne-Prager-Yamakawa, all radii 1
+    UnequalSpheres,   ///< the same, any radii
+    GaussianEnvelopes ///< force coupling, any radii
 };
 
 /**
@@ -56,11 +66,8 @@ template <class Real> struct AllPairsKernels {
     AddRows addRecorded; ///< the same from that record
 };
 
-/**
- * The loops for the best instruction set of this machine.
- * @param equalRadii  all radii are 1
- */
-template <class Real> AllPairsKernels<Real> allPairsKernels(bool equalRadii);
+/** The loops for the best instruction set of this machine. */
+template <class Real> AllPairsKernels<Real> allPairsKernels(PairLaw law);
 
 } // namespace PSE
 

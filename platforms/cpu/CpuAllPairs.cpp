@@ -12,6 +12,13 @@ namespace {
 /// few for memory, and for the time it takes to add them up.
 constexpr int PARTICLES_PER_SLAB = 64, MOST_SLABS = 64;
 constexpr double MOST_RECORDED = 64e6; ///< bytes: 4000 particles in single precision
+
+PairLaw lawOf(const UnboundedPlan& plan) {
+    if (plan.model == SphereModel::ForceCoupling)
+        return PairLaw::GaussianEnvelopes;
+    return plan.equalRadii ? PairLaw::EqualSpheres : PairLaw::UnequalSpheres;
+}
+
 } // namespace
 
 template <class Real> int CpuAllPairs<Real>::slabsFor(int particles) {
@@ -20,11 +27,14 @@ template <class Real> int CpuAllPairs<Real>::slabsFor(int particles) {
 
 template <class Real>
 CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<double>& radii,
-                               const Threads& threads)
-    : KrylovVectors<Real>(threads), a(plan.a), count(static_cast<int>(radii.size())),
+                               const Threads& threads, const Threads& oneThread)
+    : KrylovVectors<Real>(oneThread), threads(threads), a(plan.a),
+      count(static_cast<int>(radii.size())),
       padded((count + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES * ALL_PAIRS_LANES),
-      loops(allPairsKernels<Real>(plan.equalRadii)), radius(padded, Real(1)), self(padded, Real(1)),
-      sums(slabsFor(count), Vector(3 * size_t(padded))) {
+      loops(allPairsKernels<Real>(lawOf(plan))),
+      gaussianF(plan.gaussian.F.begin(), plan.gaussian.F.end()),
+      gaussianC(plan.gaussian.C.begin(), plan.gaussian.C.end()), radius(padded, Real(1)),
+      self(padded, Real(1)), sums(slabsFor(count), Vector(3 * size_t(padded))) {
     this->resize(padded);
     records.resize(sums.size());
     for (int i = 0; i < count; i++) {
@@ -34,6 +44,10 @@ CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<doub
     for (int c = 0; c < 3; c++) {
         places[c].assign(padded, Real(0));
         rests[c].assign(padded, Real(0));
+    }
+    if (gaussianF.size() % 2 != 0) {
+        gaussianF.push_back(0);
+        gaussianC.push_back(0);
     }
     divideRows();
     double bytes = 0;
@@ -68,9 +82,18 @@ template <class Real> void CpuAllPairs<Real>::setPositions(const std::vector<Vec
 template <class Real>
 double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w, double t,
                                       Vector& out) const {
-    const AllPairs<Real> pairs = {
-        count,           padded,          places[0].data(), places[1].data(), places[2].data(),
-        rests[0].data(), rests[1].data(), rests[2].data(),  radius.data()};
+    const AllPairs<Real> pairs = {count,
+                                  padded,
+                                  places[0].data(),
+                                  places[1].data(),
+                                  places[2].data(),
+                                  rests[0].data(),
+                                  rests[1].data(),
+                                  rests[2].data(),
+                                  radius.data(),
+                                  gaussianF.data(),
+                                  gaussianC.data(),
+                                  static_cast<int>(gaussianF.size())};
     const bool keeps = keepsRecord || recorded;
     const auto loop = recorded ? loops.addRecorded : keeps ? loops.recordRows : loops.addRows;
     threads.run(static_cast<int>(sums.size()), [&](int slab, int) {
@@ -84,7 +107,7 @@ double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w
              keeps ? records[slab].data() : nullptr);
     });
     recorded = keeps;
-    return this->sumOverTasks([&](int from, int to, int) {
+    return this->sumOverTasks(threads, [&](int from, int to, int) {
         return addSlabs(from, std::min(to, count), v, s, w, t, out);
     });
 }

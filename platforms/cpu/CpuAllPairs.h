@@ -26,9 +26,13 @@ template <class Real> class CpuAllPairs : public KrylovVectors<Real> {
 public:
     using typename KrylovVectors<Real>::Vector;
 
-    /** @param radii  of the particles (nm) */
+    /**
+     * @param radii      of the particles (nm)
+     * @param threads    for products
+     * @param oneThread  for vectors: beside products their operations are too short to wake others
+     */
     CpuAllPairs(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
-                const Threads& threads);
+                const Threads& threads, const Threads& oneThread);
     /** @param x  positions (nm) */
     void setPositions(const std::vector<numerics::Vec3>& x);
     int stride() const { return padded; }
@@ -43,12 +47,13 @@ private:
     double addSlabs(int from, int to, const Vector& v, double s, const Vector& w, double t,
                     Vector& out) const;
 
-    using KrylovVectors<Real>::threads;
     using KrylovVectors<Real>::kernels;
 
+    const Threads& threads;
     double a;
     int count, padded;
     AllPairsKernels<Real> loops;
+    Vector gaussianF, gaussianC;         ///< of force coupling, an even number of terms
     Vector radius, self;                 ///< radius over a, and its inverse
     Vector places[3], rests[3];          ///< coordinates, and what single precision leaves of them
     std::vector<int> firstRow;           ///< of each slab; the last is `count`

@@ -18,7 +18,8 @@ CpuUnbounded<Real>::CpuUnbounded(const UnboundedPlan& plan, const std::vector<do
                                  double viscosity, const std::vector<int>& indices,
                                  OpenMM::ThreadPool& pool, StageClock& clock)
     : plan(plan), drag(6 * M_PI * viscosity * plan.a), indices(indices),
-      threads(pool, indices.size() < FEW_PARTICLES), clock(clock), pairs(plan, radii, threads) {
+      threads(pool, indices.size() < FEW_PARTICLES), oneThread(pool, true), clock(clock),
+      pairs(plan, radii, threads, oneThread) {
     forced.assign(3 * size_t(pairs.stride()), Real(0));
     random = forced;
 }
@@ -81,7 +82,7 @@ template <class Real> void CpuUnbounded<Real>::drawNoise(const Thermal& thermal)
     iterations = lanczosSquareRoot(pairs, random,
                                    LanczosTridiagonal(plan.lanczosTolerance, plan.negativeTolerance,
                                                       LanczosTridiagonal::WHOLE),
-                                   plan.precision == Precision::Double);
+                                   true);
 }
 
 template class CpuUnbounded<float>;

@@ -32,7 +32,7 @@ private:
     numerics::UnboundedPlan plan;
     double drag; ///< 6 pi eta a
     std::vector<int> indices;
-    Threads threads;
+    Threads threads, oneThread;
     StageClock& clock;
     CpuAllPairs<Real> pairs;
     WaveKernels<Real> noiseLoops = waveKernels<Real>();

@@ -52,8 +52,11 @@ public:
 protected:
     /** The sum of what work(from, to, task) returns, in the order of the tasks. */
     template <class Work> double sumOverTasks(Work work) const {
+        return sumOverTasks(threads, work);
+    }
+    template <class Work> double sumOverTasks(const Threads& workers, Work work) const {
         partial.resize(Threads::blocks(count));
-        threads.runBlocks(
+        workers.runBlocks(
             count, [&](int from, int to, int task) { partial[task] = work(from, to, task); });
         double total = 0;
         for (double sum : partial)

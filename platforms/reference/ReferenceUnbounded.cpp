@@ -29,7 +29,7 @@ void ReferenceUnbounded::multiply(const Vectors& v, Vectors& out) const {
         for (size_t j = 0; j < i; j++) {
             const Vec3 d = positions[i] - positions[j];
             const double r = d.norm();
-            const PairScalars m = rpyScalars(r, radii[i], radii[j]);
+            const PairScalars m = totalScalars(plan.model, r, radii[i], radii[j]);
             // Coincident particles have no direction, and need none: F = G there.
             const Vec3 along = r > 0 ? Vec3(d / r) : Vec3(Vec3::Zero());
             out[i] += m.F * v[j] + (m.G - m.F) * along.dot(v[j]) * along;

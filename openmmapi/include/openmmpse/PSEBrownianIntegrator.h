@@ -70,7 +70,7 @@ public:
         /// rigid spheres to the order of the Rotne-Prager-Yamakawa tensor, any overlap
         RotnePragerYamakawa = 0,
         /// the fluctuating force-coupling method: Gaussian envelopes, sigma = a/sqrt(pi), smooth at
-        /// every distance; one radius for all particles
+        /// every distance; in a periodic fluid one radius for all particles
         ForceCoupling = 1,
         FreeDraining = 2 ///< no hydrodynamic interaction: M = 1/(6 pi eta a)
     };

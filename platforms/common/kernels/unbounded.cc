@@ -27,8 +27,12 @@ KERNEL void locateCentres(int n, GLOBAL const real4* RESTRICT posq, GLOBAL const
     }
 }
 
-/** F and C of a pair of spheres whose radii are ai and aj [T3, T24]. */
+/** F and C of a pair of spheres whose radii are ai and aj [T3, T24], or of their envelopes [T53]. */
 DEVICE real2 pairScalars(real r2, real ai, real aj) {
+#ifdef GAUSSIAN_F
+    const real squares = ai*ai+aj*aj, s = RSQRT(squares+(real) SPREAD*r2), t = 2*squares*s*s-1;
+    return make_real2(s*GAUSSIAN_F, s*s*s*GAUSSIAN_C);
+#else
     // C d d^T vanishes where 1/r^2 could overflow
     r2 = r2 < (real) SMALLEST_R2 ? (real) SMALLEST_R2 : r2;
     const real s = RSQRT(r2), s2 = s*s;
@@ -44,7 +48,8 @@ DEVICE real2 pairScalars(real r2, real ai, real aj) {
     if (r2 <= difference2)
         return make_real2(1/(ai > aj ? ai : aj), 0);
     const real inverse = 1/(ai*aj), scale = s*s2*(real) (1.0/32), skew = difference2+3*r2, gap = difference2-r2;
-    return make_real2(inverse*((real) 0.5*sum-skew*skew*scale), inverse*s2*3*scale*gap*gap);
+    return make_real2(inverse*((real) 0.5*sum-skew*skew*scale), 3*inverse*(s2*gap)*(scale*gap));
+#endif
 #endif
 }
 
