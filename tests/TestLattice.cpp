@@ -219,6 +219,26 @@ TEST(Lattice, EqualityComparesTheVectors) {
                 Lattice(Vec3(1, 0, 0), Vec3(0.1, 2, 0), Vec3(0, 0, 3)));
 }
 
+/** b and c under the flow alone, less the flips, are those of the sheared box; both kinds occur. */
+TEST(Lattice, FlipsAreWhatShearingTakesOff) {
+    int none = 0, some = 0;
+    for (const Lattice& box : boxes())
+        for (double strain : {1e-3, -0.3, 0.5, 0.77, -1.6, 12.25}) {
+            const std::array<int, 2> flips = box.flips(strain);
+            Matrix3 flowed = box.vectors();
+            flowed.row(0) += strain * flowed.row(1);
+            for (int d = 1; d < 3; d++) {
+                flowed.col(d) -= flips[d - 1] * flowed.col(0);
+                (flips[d - 1] == 0 ? none : some)++;
+            }
+            flowed(0, 0) = box.vectors()(0, 0);
+            EXPECT_LE((flowed - box.sheared(strain).vectors()).cwiseAbs().maxCoeff(),
+                      1e-14 * (1 + std::fabs(strain)) * box.vectors().cwiseAbs().maxCoeff());
+        }
+    EXPECT_GT(none, 10);
+    EXPECT_GT(some, 10);
+}
+
 TEST(Lattice, RefusesWhatIsNotAReducedFiniteBox) {
     const double nan = std::numeric_limits<double>::quiet_NaN(),
                  inf = std::numeric_limits<double>::infinity();

@@ -6,8 +6,8 @@ import pytest
 
 import openmmpse
 from platformnames import contextOn, familyOf
-from scenes import (ETA, Scene, constantForces, cube, makeContext, makeSystem, mixture, positionsOf,
-                    randomForces, randomSuspension, tilted)
+from scenes import (ETA, Scene, constantForces, cube, makeContext, makeSystem, mixture, periodicDummyForce,
+                    positionsOf, randomForces, randomSuspension, tilted)
 
 pytestmark = [pytest.mark.deviceOnly, pytest.mark.onePrecision]
 L, RADIUS = 40.0, 0.5
@@ -161,6 +161,44 @@ def testABoxThatChangesNeedsNoNewProgram(platformName, monkeypatch, tmp_path):
     integrator.step(1)
     assert integrator.getNumericalParameters()["gridDimensions"] != (0, 0, 0)
     assert list(tmp_path.glob("particles*")) == []
+
+
+def testAShearedBoxNeedsNoNewProgram(platformName, monkeypatch, tmp_path):
+    """Nor does one whose rate begins later, once it has a Plan."""
+    scene = randomSuspension(40, 0.1, tilted(1.0), RADIUS, seed=4)
+    context, integrator = makeContext(scene, platformName, 300.0, 1.0, LOOSE)
+    integrator.step(1)
+    integrator.setShearRate(0.1)
+    integrator.step(1)
+    plan = integrator.getNumericalParameters()["gridDimensions"]
+    monkeypatch.setenv("OPENMMPSE_KERNEL_DUMP", str(tmp_path))
+    integrator.step(12)
+    assert integrator.getStrain() > 1
+    assert integrator.getNumericalParameters()["gridDimensions"] == plan
+    assert list(tmp_path.iterdir()) == []
+
+
+def testACheckpointKnowsImagesInAShearedBox(platformName):
+    """Of particles that OpenMM has wrapped: they continue to the bit, where they were, past flips."""
+    scene = randomSuspension(40, 0.1, tilted(1.0), RADIUS, seed=4)
+
+    def make():
+        def configure(integrator):
+            integrator.setMobilityModel(openmmpse.PSEBrownianIntegrator.FreeDraining)
+            integrator.setShearRate(0.1)
+        return makeContext(scene, platformName, 300.0, 1.0, seed=8, configure=configure,
+                           forces=[periodicDummyForce(scene.count, scene.box)])
+    context, integrator = make()
+    integrator.step(270)
+    saved = context.createCheckpoint()
+    integrator.step(20)
+    expected = positionsOf(context)
+    assert abs(expected).max() > 5*scene.box[0, 0]
+    other, fresh = make()
+    other.loadCheckpoint(saved)
+    fresh.step(20)
+    assert np.array_equal(positionsOf(other), expected)
+    assert fresh.getStrain() == integrator.getStrain()
 
 
 def testARectangularDefaultBoxIsNotSheared(platformName):

@@ -494,10 +494,11 @@ def testProtocolsThatCannotBe(arguments, words):
 
 @pytest.mark.onePrecision
 def testOnlyMasslessParticles(platformName):
-    """Nothing moves, and the box of a periodic Force tilts all the same."""
+    """Nothing moves, in whatever image, and the box of a periodic Force tilts all the same."""
     s = suspension()
+    s = s.moved(np.outer(np.arange(s.count) % 3 - 1, s.box[1] + s.box[2]))
     context, integrator = makeContext(s, platformName, T, DT, masses=[0.0]*s.count,
                                       forces=[repulsion(s)], configure=shear(0.1))
     integrator.step(4)
-    assert abs(positionsOf(context) - s.positions).max() < 1e-6
+    assert abs(positionsOf(context) - s.positions).max() < max(1e-6, rounding(platformName))
     assert boxOf(context)[1, 0] == pytest.approx(1e-3*s.box[0, 0] + 0.4*s.box[1, 1], rel=1e-5)
