@@ -50,8 +50,10 @@ def boxOf(context):
 
 
 def rounding(platformName):
-    """Of positions of some ten nanometres."""
-    return 1e-5 if "single" in platformName else 1e-9 if isDevice(platformName) else 1e-11
+    """Of positions of some ten nanometres; OpenMM wraps them in floats, in mixed precision, too."""
+    if not isDevice(platformName):
+        return 1e-11
+    return {"single": 1e-5, "mixed": 1e-6, "double": 1e-9}[platformName.partition("-")[2]]
 
 
 def repulsion(scene):
