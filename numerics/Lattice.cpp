@@ -25,19 +25,28 @@ Lattice Lattice::orthorhombic(double x, double y, double z) {
     return Lattice(Vec3(x, 0, 0), Vec3(0, y, 0), Vec3(0, 0, z));
 }
 
+namespace {
+
+/** Adds to column `from` what multiples of column d it takes for its entry d to be reduced. */
+void reduce(Matrix3& v, int from, int d) {
+    const Vec3 edge = v.col(d);
+    double& x = v(d, from);
+    if (std::fabs(x) > edge[d])
+        v.col(from) -= edge * std::nearbyint(x / edge[d]);
+    // compared as OpenMM compares, and exact: subtraction of numbers within a factor of two
+    while (2 * x > edge[d])
+        v.col(from) -= edge;
+    while (2 * x < -edge[d])
+        v.col(from) += edge;
+}
+
+} // namespace
+
 Lattice Lattice::sheared(double strain) const {
-    const double ax = boxVectors(0, 0);
     Matrix3 v = boxVectors;
     for (int d = 1; d < 3; d++) {
-        double& x = v(0, d);
-        x += strain * v(1, d);
-        if (std::fabs(x) > ax)
-            x -= ax * std::nearbyint(x / ax);
-        // compared as OpenMM compares, and exact: subtraction of numbers within a factor of two
-        while (2 * x > ax)
-            x -= ax;
-        while (2 * x < -ax)
-            x += ax;
+        v(0, d) += strain * v(1, d);
+        reduce(v, d, 0);
     }
     return Lattice(v.col(0), v.col(1), v.col(2));
 }
@@ -50,6 +59,15 @@ std::array<int, 2> Lattice::flips(double strain) const {
         count[d - 1] = static_cast<int>(std::nearbyint(taken / boxVectors(0, 0)));
     }
     return count;
+}
+
+Lattice Lattice::deformed(const Matrix3& map) const {
+    Matrix3 v = map.triangularView<Eigen::Upper>() * boxVectors;
+    v(1, 0) = v(2, 0) = v(2, 1) = 0;
+    reduce(v, 2, 1);
+    reduce(v, 2, 0);
+    reduce(v, 1, 0);
+    return Lattice(v.col(0), v.col(1), v.col(2));
 }
 
 Lattice Lattice::mostSheared() const {

@@ -61,6 +61,11 @@ public:
      * further: its b is b + strain b_y e_x - flips[0] a.
      */
     std::array<int, 2> flips(double strain) const;
+    /**
+     * The box after x -> map x, in reduced form: the same lattice of images [T47].
+     * @param map  upper triangular, with a positive diagonal
+     */
+    Lattice deformed(const Matrix3& map) const;
     /** The box of the longest vectors that sheared() can return for any strain. */
     Lattice mostSheared() const;
     Lattice scaled(double factor) const;

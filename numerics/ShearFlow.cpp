@@ -19,4 +19,15 @@ double ShearFlow::strain(double from, double dt) const {
     }
 }
 
+double ShearFlow::rateAt(double t) const {
+    switch (protocol) {
+    case Protocol::Oscillatory:
+        return rate * std::cos(2 * M_PI * t / time);
+    case Protocol::StartUp:
+        return t < time ? 0 : rate;
+    default:
+        return rate;
+    }
+}
+
 } // namespace PSE::numerics

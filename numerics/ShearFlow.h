@@ -17,6 +17,8 @@ struct ShearFlow {
 
     /** The exact integral of the rate over a step [from, from + dt]. */
     double strain(double from, double dt) const;
+    /** The rate at a time (1/ps). */
+    double rateAt(double t) const;
 };
 
 } // namespace PSE::numerics

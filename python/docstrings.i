@@ -359,6 +359,44 @@ TypeError
 openmm.OpenMMException
     if count is negative, the integrator has no Context yet, or a position is not finite
 %}
+%feature("docstring") PSE::PSEBrownianIntegrator::computeStress %{
+Compute the stress that the particles add to that of the solvent, at the current positions.
+
+Positive entries mean tension: a dumbbell stretched along x + y has a positive xy entry, and the
+osmotic pressure is -trace/3. The parts: IdealStress, -n kT; InterparticleStress, the derivative of
+the potential energy by a strain of the box and everything in it, over the volume, right for every
+Force with its periodic images; HydrodynamicStress, the resistance of each single sphere to the flow
+of setShearRate(), (20/3) pi eta a^3 E/V with E the rate of strain, zero at rest. There is no other
+part: beads carry no stresslets, and M has no divergence. Averages over time divided by the shear
+rate give the viscosity that the particles add to the solvent's.
+
+The interparticle part takes 24 energies, good to 1e-8 of |U|/V in double precision (Reference,
+devices in double precision) and 1e-4 elsewhere. The Context is left as it is. Forces whose energy
+jumps at a cut-off contribute the jumps, too: use a switching function. A Force that depends on
+absolute positions has no stress: leave it out by groups.
+
+Parameters
+----------
+parts : int
+    sum of PSEBrownianIntegrator.IdealStress, .InterparticleStress, .HydrodynamicStress;
+    default PSEBrownianIntegrator.TotalStress, all three
+groups : int or set of int
+    force groups to include, as bits or as a set; default all that the integrator uses
+
+Returns
+-------
+Quantity of a numpy.ndarray of shape (3, 3)
+    in kJ/(mol nm^3); 1 of it is 1.66054 MPa
+
+Raises
+------
+TypeError
+    if parts or groups are of the wrong kind
+openmm.OpenMMException
+    if there is no Context or no periodic box, a position is not finite, a Force has no energy in a
+    box strained by up to 0.007, or, on OpenCL and CUDA, the default box is rectangular and the
+    interparticle part is asked for
+%}
 %feature("docstring") PSE::PSEBrownianIntegrator::describe %{
 Tell which effects are active and why, the parameters in use and what share of a step each costs.
 

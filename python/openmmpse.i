@@ -26,7 +26,8 @@ using namespace PSE::binding;
 import numpy
 from openmm import unit
 from openmmpse.conversion import (
-    VISCOSITY_UNIT, arrayOfForces, inUnit, integer, numericalParameterArguments)
+    STRESS_UNIT, VISCOSITY_UNIT, arrayOfForces, forceGroups, inUnit, integer,
+    numericalParameterArguments)
 %}
 
 // ---- exceptions of C++ become openmm.OpenMMException ----
@@ -52,6 +53,7 @@ from openmmpse.conversion import (
 %enddef
 PSE_WITHOUT_GIL(applyMobility)
 PSE_WITHOUT_GIL(sampleBrownianDisplacements)
+PSE_WITHOUT_GIL(computeStress)
 
 // ---- structures ----
 
@@ -150,6 +152,13 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 %}
 %feature("pythonappend") PSE::PSEBrownianIntegrator::sampleBrownianDisplacements %{
     val = numpy.frombuffer(val).reshape(count, self._particleCount(), 3)
+%}
+
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::computeStress %{
+    parts, groups = integer(parts, "parts"), forceGroups(groups)
+%}
+%feature("pythonappend") PSE::PSEBrownianIntegrator::computeStress %{
+    val = unit.Quantity(numpy.frombuffer(val).reshape(3, 3), STRESS_UNIT)
 %}
 
 %include "docstrings.i"

@@ -57,6 +57,9 @@ public:
                                              int) override {
         return {};
     }
+    vector<Vec3> computeStress(ContextImpl&, const PSEBrownianIntegrator&, int, int) override {
+        return {};
+    }
     PSE::NumericalParameters getNumericalParameters() const override { return {}; }
     vector<PSE::StageTime> getStageTimes() const override { return {}; }
     void createCheckpoint(std::ostream&) const override {}

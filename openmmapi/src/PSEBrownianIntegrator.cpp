@@ -318,6 +318,18 @@ vector<Vec3> PSEBrownianIntegrator::sampleBrownianDisplacements(int count) {
                                                                               count);
 }
 
+vector<Vec3> PSEBrownianIntegrator::computeStress(int parts, int groups) {
+    requirePositions("computeStress");
+    requireInRange("stress parts", parts, IdealStress, TotalStress);
+    if (scene->unbounded || !scene->periodicBox)
+        refuse("computeStress: nothing here is periodic, so there is no volume to refer a stress "
+               "to; call setFluidBoundary(Periodic) before the Context is created, or sum "
+               "positions times forces of getState() yourself");
+    kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
+    return kernel.getAs<IntegratePSEStepKernel>().computeStress(
+        *context, *this, parts, groups & getIntegrationForceGroups());
+}
+
 NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
     requireBound("getNumericalParameters");
     return kernel.getAs<const IntegratePSEStepKernel>().getNumericalParameters();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "StepKernel.h"
+#include "StrainedContext.h"
 #include "numerics/ShearFlow.h"
+#include "numerics/Stress.h"
 #include "openmmpse/internal/Units.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/internal/ContextImpl.h"
@@ -34,6 +36,8 @@ constexpr double GROWTH = 1.03, SHRINKAGE = 0.97;
 /// box that moves; a larger one sets another box once and for all.
 constexpr double SMALL_CHANGE = 0.1;
 constexpr double ROUNDING = 1e-12;
+/// Relative rounding of a sum of energies, by the precision of its terms.
+constexpr double DOUBLE_ENERGY = 1e-15, SINGLE_ENERGY = 1e-7;
 
 template <class T> void write(std::ostream& stream, const T& value) {
     stream.write(reinterpret_cast<const char*>(&value), sizeof(T));
@@ -61,6 +65,14 @@ SplitChoice choiceOf(PSEBrownianIntegrator::Split split) {
     default:
         return SplitChoice::Automatic;
     }
+}
+
+/** Units of OpenMM, of a matrix that is symmetric: rows are columns. */
+std::vector<OmmVec3> rowsOf(const Matrix3& matrix) {
+    std::vector<OmmVec3> rows;
+    for (int d = 0; d < 3; d++)
+        rows.emplace_back(matrix(d, 0), matrix(d, 1), matrix(d, 2));
+    return rows;
 }
 
 ShearFlow flowOf(const PSEBrownianIntegrator& integrator) {
@@ -212,6 +224,51 @@ bool PlannedStepKernel::isSheared() const {
 
 double PlannedStepKernel::strainOf(double time, double dt) const {
     return settings->getShearRate() == 0 ? 0 : flowOf(*settings).strain(time, dt);
+}
+
+std::vector<OmmVec3> PlannedStepKernel::computeStress(ContextImpl& context,
+                                                      const PSEBrownianIntegrator& integrator,
+                                                      int parts, int groups) {
+    const double volume = currentBox().volume();
+    Matrix3 stress = Matrix3::Zero();
+    if (parts & PSEBrownianIntegrator::IdealStress)
+        stress += idealStress(double(scene.mobile.size()),
+                              KT_PER_KELVIN * integrator.getTemperature(), volume);
+    if (parts & PSEBrownianIntegrator::HydrodynamicStress)
+        stress += singleSphereStress(scene.radii, viscosity,
+                                     flowOf(integrator).rateAt(context.getTime()), volume);
+    if (parts & PSEBrownianIntegrator::InterparticleStress)
+        stress += interparticleStress(context, groups);
+    return rowsOf(stress);
+}
+
+Matrix3 PlannedStepKernel::interparticleStress(ContextImpl& context, int groups) {
+    if (!boxCanTilt())
+        throw OpenMMException(
+            "PSEBrownianIntegrator: computeStress: the box of the System is rectangular, and on this "
+            "platform OpenMM computes no Force in a sheared box then; tilt the default box a little "
+            "before the Context is created (System.setDefaultPeriodicBoxVectors with "
+            "b.x = 1e-3 a.x, say), or use the platform CPU");
+    const Lattice box = currentBox();
+    straining = true;
+    StrainedContext strained(context, box, groups);
+    const double step = strainStep(strained.isDouble() ? DOUBLE_ENERGY : SINGLE_ENERGY);
+    const auto restore = [&] {
+        strained.restore();
+        straining = false;
+    };
+    try {
+        const Matrix3 slope =
+            strainDerivative([&](const Matrix3& map) { return strained.energy(map); }, step);
+        restore();
+        return slope / box.volume();
+    } catch (const std::exception& failure) {
+        restore();
+        std::ostringstream message;
+        message << "PSEBrownianIntegrator: computeStress: no energy in a box strained by " << step
+                << ": " << failure.what();
+        throw OpenMMException(message.str());
+    }
 }
 
 std::optional<PlannedStepKernel::Prepared> PlannedStepKernel::prepareFor(const Lattice& box) const {
@@ -405,6 +462,8 @@ void PlannedStepKernel::setStepState(const StepState& state) {
 }
 
 void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
+    if (straining)
+        return;
     const StepState state = getStepState();
     writeText(stream, CHECKPOINT_MAGIC);
     // The box may have changed since the last step: what counts is the Plan that the next will use.
@@ -421,6 +480,8 @@ void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
 }
 
 void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
+    if (straining)
+        return;
     const string magic = readText(stream, 256);
     if (magic != CHECKPOINT_MAGIC)
         throw OpenMMException(

@@ -47,6 +47,9 @@ public:
     StepState getStepState() const override;
     double getStrain() const override { return strain; }
     void setStepState(const StepState& state) override;
+    std::vector<OpenMM::Vec3> computeStress(OpenMM::ContextImpl& context,
+                                            const PSEBrownianIntegrator& integrator, int parts,
+                                            int groups) override;
 
 protected:
     /** The box of the Context, now. */
@@ -71,6 +74,8 @@ protected:
     /** As getNumericalParameters() tells it; without a Plan, it has no split. */
     virtual std::string precisionName(const numerics::Plan& plan) const = 0;
     virtual std::string precisionName(const numerics::UnboundedPlan& plan) const = 0;
+    /** Whether Forces can be computed in a box that is not rectangular. */
+    virtual bool boxCanTilt() const { return true; }
     /** Relative rounding of a coordinate of the Context. */
     virtual double coordinateRounding() const { return 1.1e-16; }
 
@@ -109,6 +114,8 @@ private:
         numerics::Plan plan;
     };
     numerics::Lattice currentBox() const;
+    /** (1/V) dU/d(strain) [T47]. */
+    numerics::Matrix3 interparticleStress(OpenMM::ContextImpl& context, int groups);
     bool isSheared() const;
     /** What must be planned for before a step in that box; nothing if the present Plan serves. */
     std::optional<Prepared> prepareFor(const numerics::Lattice& box) const;
@@ -129,6 +136,7 @@ private:
     numerics::Plan currentPlan = {};
     std::unique_ptr<numerics::UnboundedPlan> unboundedPlan; ///< NULL in any other scene
     int seed = 0;
+    bool straining = false; ///< checkpoints are for the Context alone: nothing here changes
 };
 
 } // namespace PSE

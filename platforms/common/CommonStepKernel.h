@@ -53,6 +53,7 @@ protected:
         return precisionName();
     }
     double coordinateRounding() const override;
+    bool boxCanTilt() const override { return device.getBoxIsTriclinic(); }
 
 private:
     std::string precisionName() const;

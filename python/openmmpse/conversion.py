@@ -10,6 +10,7 @@ import numpy
 from openmm import unit
 
 VISCOSITY_UNIT = unit.dalton / (unit.nanometer * unit.picosecond)
+STRESS_UNIT = unit.kilojoule_per_mole / unit.nanometer**3
 FORCE_UNIT = unit.kilojoule_per_mole / unit.nanometer
 PARTICLES_PER_MOLE = unit.AVOGADRO_CONSTANT_NA.value_in_unit(unit.mole**-1)
 
@@ -76,6 +77,13 @@ def integer(value, name):
         return operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: expected an integer, got {value!r}") from None
+
+
+def forceGroups(groups):
+    """Return force groups as the bits of a C++ int: given as such, or as a set as OpenMM takes it."""
+    if isinstance(groups, (set, frozenset)):
+        groups = sum(1 << integer(group, "groups") for group in groups)
+    return (integer(groups, "groups") + 2**31) % 2**32 - 2**31
 
 
 def arrayOfForces(forces, count):

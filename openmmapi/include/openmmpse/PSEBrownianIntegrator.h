@@ -102,6 +102,15 @@ public:
         OscillatoryShear = 1, ///< shear rate times cos(2 pi t/period)
         StartUpShear = 2      ///< 0 before a starting time, the shear rate from then on
     };
+    /** Parts of the stress of the particles, as bits that can be combined [T46]. */
+    enum StressPart : int {
+        IdealStress = 1, ///< -n kT, n the number of mobile particles per volume
+        /// (1/V) dU/d(strain): of all Forces, with their periodic images
+        InterparticleStress = 2,
+        /// (20/3) pi eta a^3 E/V of each sphere, E the rate of strain of the flow of setShearRate()
+        HydrodynamicStress = 4,
+        TotalStress = 7 ///< the sum of all
+    };
     /**
      * @param temperature  temperature of the solvent (in Kelvin), >= 0; 0 gives M f dt without
      * noise
@@ -245,6 +254,21 @@ public:
      * @return count*N displacements, sample by sample (in nm)
      */
     std::vector<OpenMM::Vec3> sampleBrownianDisplacements(int count);
+    /**
+     * Compute the stress that the particles add to that of the solvent, at the current positions:
+     * positive entries mean tension, -trace/3 is their (osmotic) pressure. The interparticle part
+     * is a difference of 24 energies at small strains of box and positions, which leave the Context
+     * as it is: good to 1e-8 of |U|/V in double precision, 1e-4 elsewhere (the CPU platform, single
+     * and mixed precision of devices). A Force that depends on absolute positions has no stress:
+     * leave its force group out.
+     * @param parts   bits of StressPart; default TotalStress, which is 7
+     * @param groups  force groups to include, as bits; those that the integrator leaves out (see
+     * setIntegrationForceGroups()) never count
+     * @return the three rows of the stress (in kJ/(mol nm^3))
+     * @throws OpenMMException if there is no periodic box, or, on OpenCL and CUDA, if the default
+     * box is rectangular and the interparticle part is asked for
+     */
+    std::vector<OpenMM::Vec3> computeStress(int parts = 7, int groups = -1);
     /**
      * Get the strain of all sheared steps so far: the integral of the shear rate over time. It is
      * part of checkpoints and of States with integrator parameters.

@@ -56,6 +56,15 @@ public:
     virtual std::vector<OpenMM::Vec3>
     sampleBrownianDisplacements(OpenMM::ContextImpl& context,
                                 const PSEBrownianIntegrator& integrator, int count) = 0;
+    /**
+     * The rows of the stress of the particles (kJ/(mol nm^3)); everything is left as it is, even if
+     * it throws.
+     * @param parts   what to add up: bits of PSEBrownianIntegrator::StressPart
+     * @param groups  force groups, as bits
+     */
+    virtual std::vector<OpenMM::Vec3> computeStress(OpenMM::ContextImpl& context,
+                                                    const PSEBrownianIntegrator& integrator,
+                                                    int parts, int groups) = 0;
     virtual NumericalParameters getNumericalParameters() const = 0;
     /** What each stage of the steps so far has cost; empty before the first step. */
     virtual std::vector<StageTime> getStageTimes() const = 0;
