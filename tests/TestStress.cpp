@@ -16,9 +16,7 @@ struct PowerLaw {
     Vec3 r;
     int n;
     double energy(const Matrix3& map) const { return std::pow((map * r).norm(), -n); }
-    Matrix3 derivative() const {
-        return -n * std::pow(r.norm(), -n - 2) * r * r.transpose();
-    }
+    Matrix3 derivative() const { return -n * std::pow(r.norm(), -n - 2) * r * r.transpose(); }
 };
 
 /** Of the entries, over the largest. */
@@ -58,9 +56,9 @@ TEST(Stress, IdealGasAndEinsteinsViscosity) {
 TEST(ShearFlow, RateIsTheDerivativeOfTheStrain) {
     using Protocol = ShearFlow::Protocol;
     const double h = 1e-4;
-    for (const ShearFlow& flow : {ShearFlow{Protocol::Steady, 0.3, 0},
-                                  ShearFlow{Protocol::Oscillatory, 0.3, 7},
-                                  ShearFlow{Protocol::StartUp, 0.3, 2}})
+    for (const ShearFlow& flow :
+         {ShearFlow{Protocol::Steady, 0.3, 0}, ShearFlow{Protocol::Oscillatory, 0.3, 7},
+          ShearFlow{Protocol::StartUp, 0.3, 2}})
         for (double t : {0.0, 1.0, 1.99, 2.01, 5.3})
             EXPECT_NEAR(flow.strain(t - h, 2 * h) / (2 * h), flow.rateAt(t), 1e-8) << t;
     EXPECT_EQ((ShearFlow{Protocol::StartUp, 0.3, 2}.rateAt(2)), 0.3);
@@ -81,9 +79,9 @@ void expectReduced(const Lattice& box) {
 }
 
 TEST(Lattice, DeformedIsTheImageOfTheLattice) {
-    for (const Lattice& box : {Lattice::orthorhombic(3, 4, 5),
-                               Lattice(Vec3(4, 0, 0), Vec3(2, 3, 0), Vec3(-2, 1.5, 5)),
-                               Lattice(Vec3(4, 0, 0), Vec3(-2, 3, 0), Vec3(2, -1.5, 5))})
+    for (const Lattice& box :
+         {Lattice::orthorhombic(3, 4, 5), Lattice(Vec3(4, 0, 0), Vec3(2, 3, 0), Vec3(-2, 1.5, 5)),
+          Lattice(Vec3(4, 0, 0), Vec3(-2, 3, 0), Vec3(2, -1.5, 5))})
         for (double h : {-0.9, -1e-3, 0.0, 1e-3, 0.7})
             for (int row = 0; row < 3; row++)
                 for (int column = row; column < 3; column++) {
@@ -121,9 +119,9 @@ TEST(Lattice, ShearedComesBackAfterAWholeStrain) {
 }
 
 TEST(Lattice, NoStrainMakesVectorsLongerThanMostSheared) {
-    for (const Lattice& box : {Lattice::orthorhombic(3, 4, 5),
-                               Lattice(Vec3(4, 0, 0), Vec3(0.3, 3, 0), Vec3(-1, 1.5, 5)),
-                               Lattice(Vec3(4, 0, 0), Vec3(0.3, 3, 0), Vec3(-1, 0, 5))}) {
+    for (const Lattice& box :
+         {Lattice::orthorhombic(3, 4, 5), Lattice(Vec3(4, 0, 0), Vec3(0.3, 3, 0), Vec3(-1, 1.5, 5)),
+          Lattice(Vec3(4, 0, 0), Vec3(0.3, 3, 0), Vec3(-1, 0, 5))}) {
         const Lattice most = box.mostSheared();
         double longest[3] = {};
         for (double strain = -2; strain <= 2; strain += 0.0078125)

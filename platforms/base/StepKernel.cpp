@@ -245,8 +245,10 @@ std::vector<OmmVec3> PlannedStepKernel::computeStress(ContextImpl& context,
 Matrix3 PlannedStepKernel::interparticleStress(ContextImpl& context, int groups) {
     if (!boxCanTilt())
         throw OpenMMException(
-            "PSEBrownianIntegrator: computeStress: the box of the System is rectangular, and on this "
-            "platform OpenMM computes no Force in a sheared box then; tilt the default box a little "
+            "PSEBrownianIntegrator: computeStress: the box of the System is rectangular, and on "
+            "this "
+            "platform OpenMM computes no Force in a sheared box then; tilt the default box a "
+            "little "
             "before the Context is created (System.setDefaultPeriodicBoxVectors with "
             "b.x = 1e-3 a.x, say), or use the platform CPU");
     const Lattice box = currentBox();
