@@ -288,7 +288,7 @@ void PSEBrownianIntegrator::step(int steps) {
         if (context->updateContextState())
             kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
         kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
-        context->calcForcesAndEnergy(true, false, getIntegrationForceGroups());
+        kernel.getAs<IntegratePSEStepKernel>().computeForces(*context, getIntegrationForceGroups());
         kernel.getAs<IntegratePSEStepKernel>().execute(*context, *this);
     }
 }

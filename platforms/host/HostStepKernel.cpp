@@ -89,15 +89,28 @@ void HostStepKernel::checkPositions(ContextImpl&) {
         for (int d = 0; d < 3; d++)
             fine &= std::fabs(x[d]) <= farthest; // false for what is not a number
     }
-    if (fine) {
-        factory->followBox(*data.positions, data.periodicBoxVectors);
+    if (fine)
         return;
-    }
     gather(*data.positions, positions);
     requireFinite(positions, POSITION);
     for (size_t i = 0; i < positions.size(); i++)
         if (positions[i].cwiseAbs().maxCoeff() > farthest)
             refuseFarAway(scene.mobile[i], positions[i]);
+}
+
+void HostStepKernel::computeForces(ContextImpl& context, int groups) {
+    factory->evaluate(*data.positions, data.periodicBoxVectors,
+                      [&] { PlannedStepKernel::computeForces(context, groups); });
+}
+
+StepState HostStepKernel::getStepState() const {
+    factory->startAnew();
+    return PlannedStepKernel::getStepState();
+}
+
+void HostStepKernel::setStepState(const StepState& state) {
+    factory->startAnew();
+    PlannedStepKernel::setStepState(state);
 }
 
 void HostStepKernel::addFlow(double strain, double dt) {

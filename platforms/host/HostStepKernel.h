@@ -16,7 +16,13 @@ public:
     HostStepKernel(std::string name, const OpenMM::Platform& platform,
                    OpenMM::ReferencePlatform::PlatformData& data,
                    std::unique_ptr<EngineFactory> factory);
+    void positionsChanged() override {
+        factory->followBox(*data.positions, data.periodicBoxVectors);
+    }
     void checkPositions(OpenMM::ContextImpl& context) override;
+    void computeForces(OpenMM::ContextImpl& context, int groups) override;
+    StepState getStepState() const override;
+    void setStepState(const StepState& state) override;
     void execute(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator) override;
     double computeKineticEnergy(OpenMM::ContextImpl& context) override;
     std::vector<OpenMM::Vec3> applyMobility(OpenMM::ContextImpl& context,

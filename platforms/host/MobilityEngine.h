@@ -7,6 +7,7 @@
 #include "numerics/Plan.h"
 #include "numerics/UnboundedPlan.h"
 #include "openmm/Vec3.h"
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -44,10 +45,17 @@ public:
     /** Fill in what the platform knows of the request: its precision and its costs. */
     virtual void adapt(numerics::PlanRequest& request) const = 0;
     /**
-     * What OpenMM keeps for its Forces on this platform shall fit these positions in this box; to
-     * be called before forces are computed, and after the box has been changed.
+     * Evaluate the Forces of a step at these positions in this box: what OpenMM keeps for them on
+     * this platform shall fit.
      */
+    virtual void evaluate(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*,
+                          const std::function<void()>& forces) {
+        forces();
+    }
+    /** Positions or box have been changed. */
     virtual void followBox(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*) {}
+    /** A restart begins here: what OpenMM keeps shall not depend on earlier steps. */
+    virtual void startAnew() {}
     /**
      * @param indices  particle index in the System of each mobile particle: noise belongs to the
      * particle

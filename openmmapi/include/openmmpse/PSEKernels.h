@@ -44,6 +44,10 @@ public:
     virtual void positionsChanged() {}
     /** Throw, naming the first non-finite position, before any Force sees it. */
     virtual void checkPositions(OpenMM::ContextImpl& context) = 0;
+    /** Have the forces of a step computed. @param groups  force groups, as bits */
+    virtual void computeForces(OpenMM::ContextImpl& context, int groups) {
+        context.calcForcesAndEnergy(true, false, groups);
+    }
     /**
      * Advance the positions by one step; forces have been computed. Nothing is changed if it
      * throws.

@@ -25,6 +25,11 @@ public:
     void followBox(const std::vector<Vec3>& positions, const Vec3* box) override {
         lists.follow(positions, box);
     }
+    void evaluate(const std::vector<Vec3>& positions, const Vec3* box,
+                  const std::function<void()>& forces) override {
+        lists.evaluate(positions, box, forces);
+    }
+    void startAnew() override { lists.startAnew(); }
     void adapt(numerics::PlanRequest& request) const override {
         request.singleFloor = SINGLE_PRECISION_FLOOR;
         request.directSums = false;

@@ -3,73 +3,120 @@
 #include <algorithm>
 #include <cmath>
 
-using OpenMM::Vec3;
+using namespace PSE::numerics;
+using OmmVec3 = OpenMM::Vec3;
 
 namespace PSE {
 
-void NeighbourListKeeper::follow(const std::vector<Vec3>& positions, const Vec3* boxVectors) {
-    const Box box = {boxVectors[0], boxVectors[1], boxVectors[2]};
-    boxMoved |= boxSeen && box != lastBox;
-    boxSeen = true;
-    lastBox = box;
+namespace {
+
+/// Padding, during a step: OpenMM compares squares of it with squares of displacements.
+constexpr double ANY_DISTANCE = 1e30;
+/// A list is dear: it shall serve so many steps at least, and a wider one is not worth its pairs
+/// where it serves many.
+constexpr int FEW_USES = 8, MANY_USES = 40;
+constexpr double WIDER = 1.3, WIDEST = 3;
+/// In units of the box: rounding of coordinates of the list, which are in single precision.
+constexpr double ROUNDING = 1e-6;
+/// In a slot of the thread's forces that no Force reads: every evaluation sets it to zero.
+constexpr float MARK = 2.9e38f;
+constexpr int MARKED_SLOT = 3;
+
+Vec3 fromOpenMM(const OmmVec3& v) {
+    return Vec3(v[0], v[1], v[2]);
+}
+
+} // namespace
+
+bool NeighbourListKeeper::follows() const {
     // without a cut-off the list is one of all pairs
-    if (!boxMoved || data.neighborList == NULL || data.cutoff <= 0 || !data.isPeriodic)
+    return boxMoved && data.neighborList != NULL && data.cutoff > 0 && data.isPeriodic;
+}
+
+bool NeighbourListKeeper::isOurs() const {
+    return !data.threadForce.empty() && data.threadForce[0][MARKED_SLOT] == MARK;
+}
+
+void NeighbourListKeeper::evaluate(const std::vector<OmmVec3>& positions, const OmmVec3* boxVectors,
+                                   const std::function<void()>& forces) {
+    for (int d = 0; d < 3; d++)
+        boxMoved |= boxSeen && boxVectors[d] != lastBox[d];
+    boxSeen = true;
+    std::copy(boxVectors, boxVectors + 3, lastBox);
+    follow(positions, boxVectors);
+    if (!follows() || !isOurs()) {
+        forces();
         return;
-    if (!stillServes(positions, box))
-        makeList(positions, box);
+    }
+    uses++;
+    data.paddedCutoff = data.cutoff + ANY_DISTANCE;
+    try {
+        forces();
+    } catch (...) {
+        data.paddedCutoff = data.cutoff;
+        approach.forget();
+        throw;
+    }
+    data.paddedCutoff = data.cutoff;
+    data.threadForce[0][MARKED_SLOT] = MARK;
 }
 
-/**
- * With A the map from the box of the list to this one and d_i = x_i - A x_i(list), the distance of
- * two particles that were farther apart than R = cut-off + margin in the list is at least
- * R/|A^-1| - 2 |d|; if OpenMM has made a list in between, with A', d', at least
- * (R - 2 |d'|)/|A' A^-1| - 2 |d|. The largest deviations since the list stand for all of them.
- */
-bool NeighbourListKeeper::stillServes(const std::vector<Vec3>& positions, const Box& box) {
-    if (positions.size() != listPositions.size())
-        return false;
-    // both boxes are triangular: the images of the unit vectors, one after the other
-    Vec3 map[3];
-    for (int d = 0; d < 3; d++) {
-        map[d] = box[d];
-        for (int c = 0; c < d; c++)
-            map[d] -= map[c] * listBox[d][c];
-        map[d] *= 1 / listBox[d][d];
+void NeighbourListKeeper::follow(const std::vector<OmmVec3>& positions, const OmmVec3* boxVectors) {
+    if (!follows())
+        return;
+    if (openmmPadding == 0)
+        openmmPadding = padding = data.paddedCutoff - data.cutoff;
+    data.paddedCutoff = data.cutoff;
+    const Lattice box(fromOpenMM(boxVectors[0]), fromOpenMM(boxVectors[1]),
+                      fromOpenMM(boxVectors[2]));
+    places.resize(positions.size());
+    std::transform(positions.begin(), positions.end(), places.begin(), fromOpenMM);
+    const double rounding = ROUNDING * box.vectors().diagonal().maxCoeff();
+    if (isOurs()) {
+        if (approach.nearest(range, places, box) >= data.cutoff + rounding)
+            return;
+        adaptPadding();
     }
-    double strain = 0, way = 0;
-    for (int d = 0; d < 3; d++) {
-        Vec3 change = map[d];
-        change[d] -= 1;
-        strain += change.dot(change);
-    }
-    for (size_t i = 0; i < positions.size(); i++) {
-        const Vec3& x = listPositions[i];
-        const Vec3 left = positions[i] - map[0] * x[0] - map[1] * x[1] - map[2] * x[2];
-        way = std::max(way, left.dot(left));
-    }
-    largestStrain = std::max(largestStrain, std::sqrt(strain));
-    largestWay = std::max(largestWay, std::sqrt(way));
-    const double nearest =
-        (data.paddedCutoff - 2 * largestWay) * (1 - largestStrain) / (1 + largestStrain) -
-        2 * largestWay;
-    return nearest >= data.cutoff;
+    const double widest = std::max(openmmPadding, 0.5 * box.smallestWidth() - data.cutoff);
+    range = data.cutoff + std::min(padding, widest);
+    approach.forget();
+    makeList(positions, boxVectors);
+    if (isOurs())
+        approach.start(places, box);
 }
 
-void NeighbourListKeeper::makeList(const std::vector<Vec3>& positions, const Box& box) {
+void NeighbourListKeeper::makeList(const std::vector<OmmVec3>& positions,
+                                   const OmmVec3* boxVectors) {
     // in the primary box, in single precision: as the list wants them, and OpenMM will do it again
+    data.threadForce[0][MARKED_SLOT] = 0;
     for (size_t i = 0; i < positions.size(); i++) {
-        Vec3 x = positions[i];
+        OmmVec3 x = positions[i];
         for (int d = 2; d >= 0; d--)
-            x -= box[d] * std::floor(x[d] / box[d][d]);
+            x -= boxVectors[d] * std::floor(x[d] / boxVectors[d][d]);
+        if (!fromOpenMM(x).allFinite())
+            return; // OpenMM will say so
         for (int d = 0; d < 3; d++)
             data.posq[4 * i + d] = float(x[d]);
     }
     data.neighborList->computeNeighborList(static_cast<int>(positions.size()), data.posq,
-                                           data.exclusions, box.data(), true, data.paddedCutoff,
+                                           data.exclusions, boxVectors, true, float(range),
                                            data.threads);
-    listPositions = positions;
-    listBox = box;
-    largestStrain = largestWay = 0;
+    data.threadForce[0][MARKED_SLOT] = MARK;
+    lists++;
+    uses = 0;
+}
+
+void NeighbourListKeeper::adaptPadding() {
+    if (uses < FEW_USES)
+        padding = std::min(padding * WIDER, openmmPadding * WIDEST);
+    else if (uses > MANY_USES)
+        padding = std::max(padding / WIDER, openmmPadding);
+}
+
+void NeighbourListKeeper::startAnew() {
+    approach.forget();
+    padding = openmmPadding;
+    uses = FEW_USES; // says nothing about the padding
 }
 
 } // namespace PSE
