@@ -85,6 +85,8 @@ protected:
      */
     void followBox();
     const numerics::Plan& plan() const { return currentPlan; }
+    /** Whether steps tilt the box. */
+    bool isSheared() const;
     /** The strain of a step from a time of the Context on (ps); 0 without shear. */
     double strainOf(double time, double dt) const;
     /** The box of the Context after a strain. */
@@ -116,7 +118,6 @@ private:
     numerics::Lattice currentBox() const;
     /** (1/V) dU/d(strain) [T47]. */
     numerics::Matrix3 interparticleStress(OpenMM::ContextImpl& context, int groups);
-    bool isSheared() const;
     /** What must be planned for before a step in that box; nothing if the present Plan serves. */
     std::optional<Prepared> prepareFor(const numerics::Lattice& box) const;
     Prepared prepared(const numerics::PlanRequest& request) const;

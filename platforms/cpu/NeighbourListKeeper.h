@@ -14,18 +14,22 @@ namespace PSE {
  * Keeps the neighbour list of OpenMM's CPU platform in a box that moves. OpenMM makes its list anew
  * when particles have moved by half its padding, and compares unwrapped positions for it: images
  * that come nearer because the box has changed go unnoticed, and in a flow all particles move far,
- * though together. From the first change of the box on, the list of a step is made here, when a
- * pair that is not on it might have come within the cut-off [T50], and OpenMM's own test is
- * suspended by the padding that it sees: infinite during a step, so that it never makes a list, and
- * none outside of steps, so that it makes one for every other evaluation. Without a change of the
- * box nothing happens.
+ * though together. From the first change of the box on, or from the start where steps tilt it, the
+ * list of a step is made here, when a pair that is not on it might have come within the cut-off
+ * [T50], and OpenMM's own test is suspended by the padding that it sees: infinite during a step, so
+ * that it never makes a list, and none outside of steps, so that it makes one for every other
+ * evaluation. Without a change of the box nothing happens.
  */
 class NeighbourListKeeper {
 public:
     explicit NeighbourListKeeper(OpenMM::CpuPlatform::PlatformData& data) : data(data) {}
-    /** Evaluate the Forces of a step, with a list that fits. @param boxVectors  three */
+    /**
+     * Evaluate the Forces of a step, with a list that fits.
+     * @param boxVectors  three
+     * @param moves       the box will move, if it has not yet: a restart has to know
+     */
     void evaluate(const std::vector<OpenMM::Vec3>& positions, const OpenMM::Vec3* boxVectors,
-                  const std::function<void()>& forces);
+                  bool moves, const std::function<void()>& forces);
     /**
      * Positions or box have changed: where nothing moves before the next evaluation, OpenMM makes
      * no list, whatever padding it sees.

@@ -99,7 +99,7 @@ void HostStepKernel::checkPositions(ContextImpl&) {
 }
 
 void HostStepKernel::computeForces(ContextImpl& context, int groups) {
-    factory->evaluate(*data.positions, data.periodicBoxVectors,
+    factory->evaluate(*data.positions, data.periodicBoxVectors, isSheared(),
                       [&] { PlannedStepKernel::computeForces(context, groups); });
 }
 

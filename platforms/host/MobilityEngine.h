@@ -46,9 +46,9 @@ public:
     virtual void adapt(numerics::PlanRequest& request) const = 0;
     /**
      * Evaluate the Forces of a step at these positions in this box: what OpenMM keeps for them on
-     * this platform shall fit.
+     * this platform shall fit. The flag tells that steps move the box.
      */
-    virtual void evaluate(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*,
+    virtual void evaluate(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*, bool,
                           const std::function<void()>& forces) {
         forces();
     }

@@ -25,9 +25,9 @@ public:
     void followBox(const std::vector<Vec3>& positions, const Vec3* box) override {
         lists.follow(positions, box);
     }
-    void evaluate(const std::vector<Vec3>& positions, const Vec3* box,
+    void evaluate(const std::vector<Vec3>& positions, const Vec3* box, bool moves,
                   const std::function<void()>& forces) override {
-        lists.evaluate(positions, box, forces);
+        lists.evaluate(positions, box, moves, forces);
     }
     void startAnew() override { lists.startAnew(); }
     void adapt(numerics::PlanRequest& request) const override {

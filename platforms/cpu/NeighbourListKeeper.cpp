@@ -38,7 +38,8 @@ bool NeighbourListKeeper::isOurs() const {
 }
 
 void NeighbourListKeeper::evaluate(const std::vector<OmmVec3>& positions, const OmmVec3* boxVectors,
-                                   const std::function<void()>& forces) {
+                                   bool moves, const std::function<void()>& forces) {
+    boxMoved |= moves;
     for (int d = 0; d < 3; d++)
         boxMoved |= boxSeen && boxVectors[d] != lastBox[d];
     boxSeen = true;
