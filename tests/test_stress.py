@@ -116,7 +116,7 @@ def pressureOfOpenMM(scene, charges, platformName, N):
     """
     nonbonded = openmm.NonbondedForce()
     nonbonded.setNonbondedMethod(openmm.NonbondedForce.PME)
-    nonbonded.setEwaldErrorTolerance(1e-6)  # at the cut-off charges jump by that
+    nonbonded.setEwaldErrorTolerance(1e-5)  # at the cut-off charges jump by that
     nonbonded.setCutoffDistance(2.2)
     nonbonded.setUseSwitchingFunction(True)
     nonbonded.setSwitchingDistance(1.5)
@@ -141,7 +141,7 @@ def testAgainstOpenMMsBarostat(platformName):
     The pressure of OpenMM on the faces of a cube, and on those of two such cubes in a box that is
     turned by 45 degrees: (xx + yy)/2 + xy and (xx + yy)/2 - xy.
     """
-    s = scenes.randomSuspension(26, 0.1, scenes.cube(1.0), 0.5, 21)
+    s = scenes.randomSuspension(14, 0.06, scenes.cube(1.0), 0.5, 21)
     charges = 0.5*(-1.0)**np.arange(s.count)
     context, integrator, pressure = pressureOfOpenMM(s, charges, platformName, s.count)
     found = stressOf(integrator, PAIRS)
