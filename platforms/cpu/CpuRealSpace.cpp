@@ -39,14 +39,30 @@ struct CellInterval {
     int cell(int i) const { return from + i < count ? from + i : from + i - count; }
     /** Lower bound of the squared distance from s to cell i, for a box of this width. */
     double squaredDistance(int i, double s, double width) const {
-        const double below = low + i - (s + 1) * count; // in cells
-        const double outside = (number == count ? 0 : std::max({0.0, below, -1 - below}));
+        const double outside = way(i, s);
         return outside * outside * (width / count) * (width / count);
+    }
+    /** From s to the nearest end of cell i, in cells; 0 within. */
+    double way(int i, double s) const {
+        const double below = low + i - (s + 1) * count;
+        return number == count ? 0 : below > 0 ? below : std::min(0.0, 1 + below);
     }
 
 private:
     int low;
 };
+/**
+ * Lower bound of |x|^2 = h^T Q h, over what lies beyond a corner: h_0/p >= 1 and h_1/q >= 1.
+ * @param Q  positive definite: h are coordinates along two box vectors, the third is free
+ */
+double squaredDistanceOfCorner(const double Q[3], double p, double q) {
+    const double mixed = Q[1] * p * q;
+    if (mixed < -Q[2] * q * q) // nearer along the edge p than at the corner
+        return (Q[0] - Q[1] * Q[1] / Q[2]) * p * p;
+    if (mixed < -Q[0] * p * p)
+        return (Q[2] - Q[1] * Q[1] / Q[0]) * q * q;
+    return Q[0] * p * p + 2 * mixed + Q[2] * q * q;
+}
 /// cells of one axis that a range of at most one cell can meet, and one for rounding
 constexpr int MOST_CELLS = 4;
 
@@ -79,6 +95,12 @@ template <class Real> void CpuRealSpace<Real>::setBox(const Lattice& other) {
     tilted = v(0, 1) != 0 || v(0, 2) != 0 || v(1, 2) != 0;
     for (int d = 0; d < 3; d++)
         width[d] = box.width(d);
+    const Matrix3 inverse = v.inverse();
+    const Vec3 x = inverse.row(0), y = inverse.row(1);
+    const double determinant = x.squaredNorm() * y.squaredNorm() - x.dot(y) * x.dot(y);
+    planeMetric[0] = y.squaredNorm() / determinant;
+    planeMetric[1] = -x.dot(y) / determinant;
+    planeMetric[2] = x.squaredNorm() / determinant;
 }
 
 template <class Real> void CpuRealSpace<Real>::setPositions(const std::vector<Vec3>& fractions) {
@@ -156,16 +178,23 @@ int CpuRealSpace<Real>::findRuns(const Vec3& s, double share, PairRun* runs) con
         y(s[1], share * reach[1], cellCount[1]), z(s[2], share * reach[2], cellCount[2]);
     const int end = z.from + z.number, last = std::min(end, cellCount[2]),
               wrapped = std::max(end - cellCount[2], 0);
-    double y2[MOST_CELLS];
-    for (int j = 0; j < y.number; j++)
+    const double most = (1 + 2 * MARGIN) * own * own;
+    double y2[MOST_CELLS], wayY[MOST_CELLS];
+    for (int j = 0; j < y.number; j++) {
         y2[j] = y.squaredDistance(j, s[1], width[1]);
+        wayY[j] = y.way(j, s[1]) / y.count;
+    }
     int n = 0;
     for (int i = 0; i < x.number; i++) {
-        const double left = (1 + 2 * MARGIN) * own * own - x.squaredDistance(i, s[0], width[0]);
+        const double left = most - x.squaredDistance(i, s[0], width[0]);
+        const double wayX = x.way(i, s[0]) / x.count;
         const int* const row = cellStart.data() + size_t(x.cell(i)) * cellCount[1] * cellCount[2];
         for (int j = 0; j < y.number; j++) {
-            if (!tilted && y2[j] >= left)
-                continue; // a corner column that is out of range
+            // a corner column that is out of range
+            if (tilted ? wayX * wayY[j] != 0 &&
+                             squaredDistanceOfCorner(planeMetric, wayX, wayY[j]) >= most
+                       : y2[j] >= left)
+                continue;
             const int* const start = row + y.cell(j) * cellCount[2];
             runs[n++] = {start[z.from], start[last]};
             if (wrapped > 0)

@@ -61,8 +61,10 @@ private:
     numerics::Lattice box;
     double a, range;
     bool sumImages, tilted;
-    bool rpy = true;                                ///< its branches are added to the polynomials
-    double width[3];                                ///< distances between opposite faces of the box
+    bool rpy = true; ///< its branches are added to the polynomials
+    double width[3]; ///< distances between opposite faces of the box
+    /// |x|^2 >= h^T Q h by the coordinates h of x along the first two box vectors: Q_00, Q_01, Q_11
+    double planeMetric[3];
     std::unique_ptr<CpuMixturePairs<Real>> mixture; ///< NULL for equal radii
     Real self = 0;                                  ///< of equal radii
     Vector coefficientsF, coefficientsC;
