@@ -28,9 +28,7 @@ public:
      * zero, for estimates: 10 %, averaged over its oscillation.
      */
     virtual double squareBeyond(double k) const = 0;
-    /**
-     * R: a pair of radii ai and aj has the range R + ai + aj.
-     */
+    /** R: the real half of radii ai and aj has faded at R + ai + aj. */
     double range() const { return R; }
 
 protected:

@@ -6,8 +6,9 @@
 
 namespace PSE::numerics {
 
-Mixture::Mixture(std::shared_ptr<const Envelope> envelope, const std::vector<double>& radii)
-    : H(std::move(envelope)), ofParticles(radii), distinct(radii) {
+Mixture::Mixture(std::shared_ptr<const Envelope> envelope, const std::vector<double>& radii,
+                 double cut)
+    : H(std::move(envelope)), ofParticles(radii), distinct(radii), pointRange(H->range() - cut) {
     std::sort(distinct.begin(), distinct.end());
     distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
 }

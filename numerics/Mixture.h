@@ -19,8 +19,13 @@ namespace PSE::numerics {
  */
 class Mixture {
 public:
-    /** @param radii  of all particles that feel the fluid, in their order */
-    Mixture(std::shared_ptr<const Envelope> envelope, const std::vector<double>& radii);
+    /**
+     * @param radii  of all particles that feel the fluid, in their order
+     * @param cut    by which every pair ends before the real half has faded, below
+     * Envelope::range()
+     */
+    Mixture(std::shared_ptr<const Envelope> envelope, const std::vector<double>& radii,
+            double cut = 0);
 
     std::string name() const { return H->name(); }
     /** Of each particle. */
@@ -35,13 +40,16 @@ public:
     const Envelope& shape() const { return *H; }
 
     /** range(ai, aj) = reach(ai) + reach(aj): beyond, M_R,ij is left out. */
-    double reach(double a) const { return 0.5 * H->range() + a; }
-    double range(double ai, double aj) const { return H->range() + ai + aj; }
+    double reach(double a) const { return 0.5 * pointRange + a; }
+    double range(double ai, double aj) const { return pointRange + ai + aj; }
+    /** Of two point forces. */
+    double rangeOfPoints() const { return pointRange; }
     double largestRange() const { return range(distinct.back(), distinct.back()); }
 
 private:
     std::shared_ptr<const Envelope> H;
     std::vector<double> ofParticles, distinct;
+    double pointRange;
 };
 
 /**

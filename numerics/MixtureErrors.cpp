@@ -14,6 +14,9 @@ namespace {
 /// mean of a diagonal entry of I - kk, measure of the k integral, and b = 6 pi w/k^2
 constexpr double PROJECTION = (2.0 / 3) / (2 * M_PI * M_PI), FACTOR = 6 * M_PI;
 constexpr double SPHERES = 4 * M_PI / 3;
+/// Of the local volume fraction, for each kind of sphere alone: in a cluster of its like the
+/// velocities of the others, too, are what an error is relative to.
+constexpr double CLUSTER_SHARE = 1.0 / 3;
 
 double shareOutside(const std::array<double, 3>& faces, double k) {
     double outside = 0;
@@ -106,7 +109,7 @@ MixtureErrors::MixtureErrors(const Composition& composition, const Lattice& box,
     mean = Eigen::Map<const Eigen::ArrayXd>(composition.counts.data(), n) / box.volume();
     const double meanPhi = composition.volume() / box.volume(), local = std::max(phi, meanPhi);
     dense = mean * local / meanPhi;
-    alone = local / (SPHERES * radii.cube());
+    alone = CLUSTER_SHARE * local / (SPHERES * radii.cube());
     for (int i = 0; i < n; i++)
         if (composition.counts[i] < 2)
             alone[i] = 0;

@@ -18,6 +18,10 @@ constexpr double BUDGET = 0.8;
 /// of that for what the envelope drops or the real half leaves out, the rest for the grid
 constexpr double DROPPED_SHARE = 0.6;
 constexpr double BANDWIDTH_STEP = 1.0 / 64; ///< as ProlatePlans
+/// of R/c: pairs may end before R + ai + aj by about the inverse of the largest wave number
+constexpr double CUT = 0.85;
+/// how far from the rule the bandwidth is sought that pairs beyond their ranges ask for
+constexpr double BANDWIDTH_BELOW = 2, BANDWIDTH_ABOVE = 4;
 /// from one range to the next, and the smallest, in radii of the smallest sphere
 constexpr double RANGE_FACTOR = 1.08, SMALLEST_RANGE = 1;
 /// in widths of the box, where pairs are summed over images
@@ -28,7 +32,7 @@ constexpr double XI_FACTOR = 1.25, LARGEST_XI = 2, REACH_BELOW = 1.5, REACH_ABOV
 /// beta per support: with the shells of spheres, narrower windows serve
 constexpr double SHAPE_PER_SUPPORT = 2.05;
 /// Nyquist wave number over that of the band, in the closed rule that ranks ranges
-constexpr double FINER = 1.06;
+constexpr double FINER = 1.12;
 /// of radial windows, in the volume-averaged radius: see PlanFamily
 constexpr double LARGEST_EXTENT = 12;
 constexpr double SINGLE_ROUNDING = 6e-8, DOUBLE_ROUNDING = 1.2e-16;
@@ -80,14 +84,14 @@ Magnification MixturePlans::magnificationOf(const Plan& plan) const {
 std::vector<int> MixturePlans::supports() const {
     if (request.overrides.windowSupport > 0)
         return {request.overrides.windowSupport};
-    return {supportFor(error) - 1, supportFor(error)};
+    return {supportFor(error), supportFor(error) - 1};
 }
 
 double MixturePlans::shapeOf(int support) const {
     return SHAPE_PER_SUPPORT * support;
 }
 
-/** Ordered pairs in range, by R. */
+/** Ordered pairs in range, by that of point forces. */
 double MixturePlans::pairsOf(double R, bool sumImages) const {
     double pairs = 0;
     for (int i = 0; i < composition.size(); i++)
@@ -103,11 +107,14 @@ double MixturePlans::pairsOf(double R, bool sumImages) const {
 }
 
 double MixturePlans::cost(const Plan& plan) const {
-    const double pairs = pairsOf(plan.mixture->shape().range(), plan.sumImages);
+    const double pairs = pairsOf(plan.mixture->rangeOfPoints(), plan.sumImages);
     if (request.directSums)
         return CostModel::directStep(composition.particles(), plan.gridPoints(), pairs, products());
     const RadialWindow window = windowOf(plan);
     const double density = plan.gridPoints() / box.volume();
+    int degree = 0;
+    for (double a : {composition.radii.front(), composition.radii.back()})
+        degree = std::max(degree, window.kernel(a, plan.tableError).polynomial.degree());
     double touched = 0;
     for (int i = 0; i < composition.size(); i++) {
         const double outer = window.reach(composition.radii[i]),
@@ -115,7 +122,7 @@ double MixturePlans::cost(const Plan& plan) const {
         touched += composition.counts[i] * density * 4 * M_PI / 3 *
                    (outer * outer * outer - inner * inner * inner);
     }
-    return touched * CostModel::SPREAD_RADIAL +
+    return touched * (CostModel::SPREAD_RADIAL + degree * CostModel::SPREAD_POWER) +
            CostModel::step(0, plan.gridPoints(), 0, pairs, products());
 }
 
@@ -130,16 +137,24 @@ double MixturePlans::givenRange() const {
                 << " nm; leave the cutoff 0 for the automatic one";
         throw std::invalid_argument(message.str());
     }
-    if (!isProlate() || wish.xi == 0)
-        return wish.realCutoff > 0 ? fromCutoff : 0;
+    if (wish.realCutoff == 0 && (!isProlate() || wish.xi == 0))
+        return 0;
+    if (!isProlate())
+        return fromCutoff;
+    if (wish.xi == 0) {
+        constexpr int ITERATIONS = 8; // each adds more than a digit
+        double R = fromCutoff;
+        for (int i = 0; i < ITERATIONS; i++)
+            R = fromCutoff + cutFor(R);
+        return R;
+    }
     const double R = 1 / (wish.xi * request.radius);
-    if (wish.realCutoff > 0 &&
-        std::fabs(R - fromCutoff) > 1e-9 * wish.realCutoff / request.radius) {
+    if (fromCutoff > R + 1e-9 * wish.realCutoff / request.radius) {
         std::ostringstream message;
         message << "the prescribed splitting parameter " << wish.xi << " /nm and real-space cutoff "
                 << wish.realCutoff
-                << " nm are not those of one prolate range (cutoff = 1/xi + twice the largest "
-                   "radius); prescribe one of them";
+                << " nm are not those of one prolate range (the cutoff is at most 1/xi + twice the "
+                   "largest radius); prescribe one of them";
         throw std::invalid_argument(message.str());
     }
     return R;
@@ -158,6 +173,16 @@ double MixturePlans::bandwidthFor(double R) const {
         (suffices(mid * BANDWIDTH_STEP) ? high : low) = mid;
     }
     return high * BANDWIDTH_STEP;
+}
+
+double MixturePlans::cutFor(double R) const {
+    return std::min(composition.radii.front(), CUT * R / bandwidthFor(R));
+}
+
+std::shared_ptr<const Mixture> MixturePlans::prolateMixture(double bandwidth, double R,
+                                                            double cut) const {
+    return std::make_shared<const Mixture>(std::make_shared<ProlateEnvelope>(bandwidth, R), radii,
+                                           cut);
 }
 
 /** With the smallest range that keeps its share, or the one prescribed. */
@@ -190,8 +215,11 @@ Plan MixturePlans::at(double parameter) const {
         plan.xi = (wish.xi > 0 ? wish.xi : 1 / (parameter * plan.a));
         const double R = 1 / (plan.xi * plan.a); // of the very number that is reported
         plan.bandwidth = bandwidthFor(R);
-        plan.mixture = std::make_shared<const Mixture>(
-            std::make_shared<ProlateEnvelope>(plan.bandwidth, R), radii);
+        plan.realCutoff =
+            (wish.realCutoff > 0 ? wish.realCutoff : plan.a * (R - cutFor(R) + largestDiameter()));
+        // and of the cut-off that is reported
+        plan.mixture =
+            prolateMixture(plan.bandwidth, R, R - (plan.realCutoff / plan.a - largestDiameter()));
     } else {
         plan.xi = (wish.xi > 0 ? wish.xi : parameter / plan.a);
         plan.mixture = hasimotoMixture(plan.xi * plan.a);
@@ -201,9 +229,9 @@ Plan MixturePlans::at(double parameter) const {
             std::make_shared<HasimotoEnvelope>(plan.xi * plan.a,
                                                cutoff / plan.a - largestDiameter()),
             radii);
+        plan.realCutoff =
+            (wish.realCutoff > 0 ? wish.realCutoff : plan.a * plan.mixture->largestRange());
     }
-    plan.realCutoff =
-        (wish.realCutoff > 0 ? wish.realCutoff : plan.a * plan.mixture->largestRange());
     completeRealHalf(plan);
     plan.windowSupport = supports().front();
     plan.windowShape = (wish.windowShape > 0 ? wish.windowShape : shapeOf(plan.windowSupport));
@@ -238,7 +266,7 @@ Plan MixturePlans::cheapest() const {
             best = plan;
         }
         if (wish.grid[0] == 0 &&
-            CostModel::step(0, 0, 0, pairsOf(plan.mixture->shape().range(), false), products()) >
+            CostModel::step(0, 0, 0, pairsOf(plan.mixture->rangeOfPoints(), false), products()) >
                 lowest)
             break;
     }
@@ -286,8 +314,28 @@ void MixturePlans::checkTables(Plan& plan) const {
     throw std::invalid_argument(message.str());
 }
 
+Plan MixturePlans::refined(const Plan& plan) const {
+    const PlanOverrides& wish = request.overrides;
+    if (!isProlate() || wish.bandwidth > 0 || wish.grid[0] > 0)
+        return plan;
+    Plan other = plan;
+    const double R = plan.mixture->shape().range(), cut = R - plan.mixture->rangeOfPoints();
+    int low = static_cast<int>((plan.bandwidth - BANDWIDTH_BELOW) / BANDWIDTH_STEP),
+        high = static_cast<int>((plan.bandwidth + BANDWIDTH_ABOVE) / BANDWIDTH_STEP);
+    low = std::max(low, static_cast<int>(ProlateSplit::SMALLEST_BANDWIDTH / BANDWIDTH_STEP) - 1);
+    high = std::min(high, static_cast<int>(ProlateSplit::LARGEST_BANDWIDTH / BANDWIDTH_STEP));
+    while (high - low > 1) {
+        const int mid = (low + high) / 2;
+        const auto mixture = prolateMixture(mid * BANDWIDTH_STEP, R, cut);
+        (errors.realTruncation(*mixture) <= DROPPED_SHARE * error ? high : low) = mid;
+    }
+    other.bandwidth = high * BANDWIDTH_STEP;
+    other.mixture = prolateMixture(other.bandwidth, R, cut);
+    return other;
+}
+
 Plan MixturePlans::best() const {
-    Plan plan = cheapest();
+    Plan plan = refined(cheapest());
     checkPlan(plan, request);
     plan = finished(plan, unitOf(plan));
     plan.windowSpacing = RadialWindow::spacing(box, plan.grid);

@@ -13,8 +13,8 @@ namespace PSE::numerics {
 struct CostModel {
     /// per particle and point of its P^3 window: spread and gather, three components
     static constexpr double SPREAD = 2;
-    /// the same per point of the ball or shell of a radial window
-    static constexpr double SPREAD_RADIAL = 3;
+    /// the same per point of the ball or shell of a radial window, and per power of its polynomial
+    static constexpr double SPREAD_RADIAL = 5, SPREAD_POWER = 0.16;
     /// per grid point: six real transforms, noise, wave factor
     static constexpr double GRID = 75;
     /// per particle and mode of a direct sum, there and back

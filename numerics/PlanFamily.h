@@ -178,7 +178,14 @@ private:
     double largestDiameter() const { return 2 * composition.radii.back(); }
     /** R of what is prescribed; 0 if nothing is. */
     double givenRange() const;
+    /** The smallest bandwidth whose dropped waves keep their share; a rule, to rank ranges by. */
     double bandwidthFor(double R) const;
+    /** The cut of a mixture: what is left there is little beside what the envelope drops. */
+    double cutFor(double R) const;
+    std::shared_ptr<const Mixture> prolateMixture(double bandwidth, double R, double cut) const;
+    /** The same with the smallest bandwidth for which the pairs beyond their ranges keep their
+     * share. */
+    Plan refined(const Plan& plan) const;
     std::shared_ptr<const Mixture> hasimotoMixture(double xi) const;
     /** Candidate with a prolate range R, or Hasimoto's xi, and the grid of a closed rule. */
     Plan at(double parameter) const;

@@ -48,7 +48,7 @@ DeviceSphereRows::DeviceSphereRows(DevicePrograms& programs, const Plan& plan, c
 void DeviceSphereRows::setBox(const Plan& plan, const Lattice& box) {
     std::vector<double> values = geometryOf(context, box, plan.a);
     const double rc = plan.mixture->largestRange();
-    values.insert(values.end(), {plan.mixture->shape().range(), 2 / (rc * rc)});
+    values.insert(values.end(), {plan.mixture->rangeOfPoints(), 2 / (rc * rc)});
     for (int d = 0; d < 3; d++)
         values.push_back(plan.a / box.width(d));
     geometry.set(values);

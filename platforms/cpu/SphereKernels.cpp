@@ -2,6 +2,8 @@
 #include "SphereKernels.h"
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "SphereKernels.cpp"
@@ -26,44 +28,35 @@ template <class Real> struct Chord {
     }
 };
 
-/** Rows at a time whose weights are evaluated: as many chains of dependent operations. */
-constexpr int ROWS = 4;
-
 /** One plane of grid points of one sphere, all that its rows have in common; in units of t. */
 template <class Real> struct SpherePlane {
     const SphereShape<Real>& shape;
     const Real* HWY_RESTRICT coefficients;
     int degree;
     Real x, left, middle, line, point; ///< `left` of 1 after what the plane takes
+
+    HWY_INLINE SpherePlane(const GridSpheres<Real>& g, int particle, int dx)
+        : shape(g.shapes[g.shape[particle]]),
+          coefficients(g.coefficients + size_t(g.shape[particle]) * (g.degree + 1)),
+          degree(g.degree), x(g.offset[3 * size_t(particle)] + dx),
+          left(1 - shape.shift - shape.scale * g.plane * x * x), middle(g.skewY * x),
+          line(shape.scale * g.line), point(shape.scale * g.point) {}
 };
+
+/** Weights of points from z0 on, counted from the middle of a row that takes `taken` of t. */
+template <class D, class Real = hn::TFromD<D>>
+HWY_INLINE hn::Vec<D> weightsAt(D d, const SpherePlane<Real>& plane, Real taken, Real z0) {
+    const auto one = hn::Set(d, Real(1)), dz = hn::Iota(d, z0);
+    const auto t = hn::MulAdd(hn::Mul(hn::Set(d, plane.point), dz), dz, hn::Set(d, taken)),
+               capped = hn::Min(t, one); // its powers stay finite
+    auto w = hn::Set(d, plane.coefficients[0]);
+    for (int power = 1; power <= plane.degree; power++)
+        w = hn::MulAdd(w, capped, hn::Set(d, plane.coefficients[power]));
+    return hn::IfThenElseZero(hn::And(hn::Lt(t, one), hn::Gt(t, hn::Set(d, plane.shape.least))), w);
+}
 
 /** Where a row lies in units of t: `left` of 1 after what plane and row take, and its middle. */
 template <class Real> struct SphereRow { Real left, centre; };
-
-/** Weights of points from z0 on, counted from the centre of the sphere, in N rows. */
-template <int N, class D, class Real = hn::TFromD<D>>
-HWY_INLINE void evaluateWeights(D d, const SpherePlane<Real>& plane,
-                                const SphereRow<Real>* HWY_RESTRICT rows, Real z0,
-                                hn::Vec<D>* HWY_RESTRICT w) {
-    const auto one = hn::Set(d, Real(1)), least = hn::Set(d, plane.shape.least),
-               point = hn::Set(d, plane.point);
-    hn::Vec<D> t[N];
-    for (int n = 0; n < N; n++) {
-        const auto dz = hn::Iota(d, z0 - rows[n].centre);
-        t[n] = hn::MulAdd(hn::Mul(point, dz), dz, hn::Set(d, 1 - rows[n].left));
-        w[n] = hn::Set(d, plane.coefficients[0]);
-    }
-    hn::Vec<D> capped[N];
-    for (int n = 0; n < N; n++)
-        capped[n] = hn::Min(t[n], one); // its powers stay finite
-    for (int power = 1; power <= plane.degree; power++) {
-        const auto c = hn::Set(d, plane.coefficients[power]);
-        for (int n = 0; n < N; n++)
-            w[n] = hn::MulAdd(w[n], capped[n], c);
-    }
-    for (int n = 0; n < N; n++)
-        w[n] = hn::IfThenElseZero(hn::And(hn::Lt(t[n], one), hn::Gt(t[n], least)), w[n]);
-}
 
 /** All vectors of one row of a sphere that is wider than a vector. */
 template <class D, class Work, class Real = hn::TFromD<D>>
@@ -83,85 +76,175 @@ HWY_INLINE void visitRow(D d, const SpherePlane<Real>& plane, const SphereRow<Re
     for (int z = chord.from; z < chord.to; z += lanes) {
         if (z >= hollow && z < filled)
             z = filled;
-        hn::Vec<D> w;
-        evaluateWeights<1>(d, plane, &row, offset + z, &w);
-        work(d, y, first + z, w);
+        work(y, first + z, weightsAt(d, plane, 1 - row.left, offset + z - row.centre));
     }
 }
 
 /**
- * Calls work(d, row, z, weights) for vectors of points of the plane `dx` beyond the first one of a
- * sphere: row y of the grid, points from z on, wherever a weight may not be zero. Spreading and
- * gathering take the same weights from here.
+ * Calls work(row, z, weights) for vectors of points of the plane `dx` beyond the first one of a
+ * sphere: row y of the grid, points from z on, wherever a weight may not be zero.
  */
 template <class D, class Work, class Real = hn::TFromD<D>>
 HWY_INLINE void visitPlane(D d, const GridSpheres<Real>& g, int particle, int dx, Work& work) {
-    const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
+    const SpherePlane<Real> plane(g, particle, dx);
+    if (plane.left <= 0)
+        return;
     const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
     const int* HWY_RESTRICT first = g.first + 3 * size_t(particle);
-    const Real x = offset[0] + dx, left = 1 - shape.shift - shape.scale * g.plane * x * x;
-    if (left <= 0)
-        return;
-    const SpherePlane<Real> plane = {shape,
-                                     g.coefficients + size_t(g.shape[particle]) * (g.degree + 1),
-                                     g.degree,
-                                     x,
-                                     left,
-                                     g.skewY * x,
-                                     shape.scale * g.line,
-                                     shape.scale * g.point};
-    const Chord<Real> chord(plane.middle, std::sqrt(left / plane.line), offset[1], shape.extent[1]);
-    const int extent = shape.extent[2];
-    const auto rowAt = [&](int dy) HWY_ATTR {
+    const Chord<Real> chord(plane.middle, std::sqrt(plane.left / plane.line), offset[1],
+                            plane.shape.extent[1]);
+    int row = (first[1] + chord.from) % g.size[1];
+    for (int dy = chord.from; dy < chord.to; dy++) {
         const Real y = offset[1] + dy, fromMiddle = y - plane.middle;
-        return SphereRow<Real>{left - plane.line * fromMiddle * fromMiddle,
-                               g.skewX * x + g.skewZ * y};
-    };
-    int dy = chord.from, row = (first[1] + dy) % g.size[1];
-    const auto next = [&]() HWY_ATTR { row = (row + 1 == g.size[1] ? 0 : row + 1); };
-    if (extent > static_cast<int>(hn::Lanes(d))) {
-        for (; dy < chord.to; dy++, next())
-            visitRow(d, plane, rowAt(dy), offset[2], extent, row, first[2], work);
-        return;
-    }
-    for (; dy + ROWS <= chord.to; dy += ROWS) {
-        const SphereRow<Real> rows[ROWS] = {rowAt(dy), rowAt(dy + 1), rowAt(dy + 2), rowAt(dy + 3)};
-        hn::Vec<D> w[ROWS];
-        evaluateWeights<ROWS>(d, plane, rows, offset[2], w);
-        for (int n = 0; n < ROWS; n++, next())
-            work(d, row, first[2], w[n]);
-    }
-    for (; dy < chord.to; dy++, next()) {
-        const SphereRow<Real> only = rowAt(dy);
-        hn::Vec<D> w;
-        evaluateWeights<1>(d, plane, &only, offset[2], &w);
-        work(d, row, first[2], w);
+        const SphereRow<Real> here = {plane.left - plane.line * fromMiddle * fromMiddle,
+                                      g.skewX * plane.x + g.skewZ * y};
+        visitRow(d, plane, here, offset[2], plane.shape.extent[2], row, first[2], work);
+        row = (row + 1 == g.size[1] ? 0 : row + 1);
     }
 }
 
-/** Adds the forces of a sphere to three planes. Not a lambda: those are not always in line. */
+/** Whether a row of the sphere is one vector, and none of its rows is met twice. */
+template <class D, class Real = hn::TFromD<D>>
+HWY_INLINE bool isNarrow(D d, const GridSpheres<Real>& g, const SphereShape<Real>& shape) {
+    return shape.extent[2] <= static_cast<int>(hn::Lanes(d)) && shape.extent[1] <= g.size[1];
+}
+
+/**
+ * Rows of narrow spheres, collected until there are enough of them to be evaluated together: chains
+ * of dependent operations then overlap, whatever the number of rows of a sphere in a plane.
+ */
+template <class Real> struct RowQueue {
+    static constexpr int ROOM = 64, MOST = ROOM - SPHERE_LANES; ///< MOST: room for one vector more
+    /// at a time, as many as the registers of the machine hold
+    static constexpr int TOGETHER = (HWY_TARGET <= HWY_AVX3 ? 8 : 4);
+    int count = 0;
+    // those behind the last one are evaluated, too: any numbers, but places that can be read
+    Real taken[ROOM], z0[ROOM], point[ROOM], least[ROOM]; ///< see weightsAt()
+    /// integers as wide as a Real
+    using Index = std::conditional_t<sizeof(Real) == 4, int32_t, Real>;
+    template <class D> using Tag = hn::Rebind<Index, D>;
+    Index coefficients[ROOM] = {}; ///< where those of the sphere start
+    Index plane[ROOM], at[ROOM];   ///< of the grid, and of the first point in it
+    Index particle[ROOM];
+};
+
+/** Weights of N rows from the one at `from` on, as weightsAt(). */
+template <int N, class D, class Real = hn::TFromD<D>>
+HWY_INLINE void evaluateRows(D d, const GridSpheres<Real>& g, const RowQueue<Real>& queue, int from,
+                             hn::Vec<D>* HWY_RESTRICT w) {
+    const auto one = hn::Set(d, Real(1));
+    const Real* coefficients[N];
+    hn::Vec<D> t[N], capped[N];
+    for (int n = 0; n < N; n++) {
+        const auto dz = hn::Iota(d, queue.z0[from + n]);
+        t[n] = hn::MulAdd(hn::Mul(hn::Set(d, queue.point[from + n]), dz), dz,
+                          hn::Set(d, queue.taken[from + n]));
+        capped[n] = hn::Min(t[n], one);
+        coefficients[n] = g.coefficients + static_cast<size_t>(queue.coefficients[from + n]);
+        w[n] = hn::Set(d, coefficients[n][0]);
+    }
+    for (int power = 1; power <= g.degree; power++)
+        for (int n = 0; n < N; n++)
+            w[n] = hn::MulAdd(w[n], capped[n], hn::Set(d, coefficients[n][power]));
+    for (int n = 0; n < N; n++)
+        w[n] = hn::IfThenElseZero(
+            hn::And(hn::Lt(t[n], one), hn::Gt(t[n], hn::Set(d, queue.least[from + n]))), w[n]);
+}
+
+/** Calls work(at, particle, weights) for all rows in their order, and empties the queue. */
+template <class D, class Work, class Real = hn::TFromD<D>>
+HWY_INLINE void workOff(D d, const GridSpheres<Real>& g, RowQueue<Real>& queue, Work& work) {
+    constexpr int N = RowQueue<Real>::TOGETHER;
+    for (int from = 0; from < queue.count; from += N) { // those behind the last one in vain
+        hn::Vec<D> w[N];
+        evaluateRows<N>(d, g, queue, from, w);
+        const int rest = queue.count - from;
+        for (int n = 0; n < N; n++) {
+            if (n == rest)
+                break;
+            work(static_cast<size_t>(queue.plane[from + n]) * g.planeLength +
+                     static_cast<size_t>(queue.at[from + n]),
+                 static_cast<int>(queue.particle[from + n]), w[n]);
+        }
+    }
+    queue.count = 0;
+}
+
+/** Append the rows of a narrow sphere in its plane `dx`, which is `x` of the grid. */
+template <class D, class Work, class Real = hn::TFromD<D>>
+HWY_INLINE void queuePlane(D d, const GridSpheres<Real>& g, int particle, int dx, int x,
+                           RowQueue<Real>& queue, Work& work) {
+    const SpherePlane<Real> plane(g, particle, dx);
+    const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
+    const int* HWY_RESTRICT first = g.first + 3 * size_t(particle);
+    const typename RowQueue<Real>::template Tag<D> di;
+    using Index = typename RowQueue<Real>::Index;
+    const int lanes = static_cast<int>(hn::Lanes(d)), extent = plane.shape.extent[1];
+    for (int dy = 0; dy < extent; dy += lanes) {
+        if (queue.count > RowQueue<Real>::MOST)
+            workOff(d, g, queue, work);
+        const auto y = hn::Iota(d, offset[1] + dy),
+                   fromMiddle = hn::Sub(y, hn::Set(d, plane.middle));
+        const auto taken = hn::MulAdd(hn::Mul(hn::Set(d, plane.line), fromMiddle), fromMiddle,
+                                      hn::Set(d, 1 - plane.left));
+        const auto z0 =
+            hn::NegMulAdd(hn::Set(d, g.skewZ), y, hn::Set(d, offset[2] - g.skewX * plane.x));
+        const auto in =
+            hn::And(hn::Lt(taken, hn::Set(d, Real(1))), hn::FirstN(d, size_t(extent - dy)));
+        // the first number is constant: others are built in memory
+        auto row = hn::Add(hn::Iota(di, Index(0)), hn::Set(di, Index(first[1] + dy)));
+        const auto size = hn::Set(di, Index(g.size[1]));
+        row = hn::IfThenElse(hn::Lt(row, size), row, hn::Sub(row, size));
+        const auto at =
+            hn::Add(hn::Mul(row, hn::Set(di, Index(g.rowLength))), hn::Set(di, Index(first[2])));
+        const int from = queue.count;
+        hn::StoreU(hn::Compress(taken, in), d, queue.taken + from);
+        hn::StoreU(hn::Compress(z0, in), d, queue.z0 + from);
+        hn::StoreU(hn::Compress(at, hn::RebindMask(di, in)), di, queue.at + from);
+        hn::StoreU(hn::Set(d, plane.point), d, queue.point + from);
+        hn::StoreU(hn::Set(d, plane.shape.least), d, queue.least + from);
+        hn::StoreU(hn::Set(di, Index(plane.coefficients - g.coefficients)), di,
+                   queue.coefficients + from);
+        hn::StoreU(hn::Set(di, Index(x)), di, queue.plane + from);
+        hn::StoreU(hn::Set(di, Index(particle)), di, queue.particle + from);
+        queue.count = from + static_cast<int>(hn::CountTrue(d, in));
+    }
+}
+
+/** Adds forces to three planes. Not lambdas here: those are not always in line. */
 template <class D, class Real = hn::TFromD<D>> struct AddForces {
+    D d;
     size_t rowLength;
     Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
-    hn::Vec<D> fx, fy, fz;
-    HWY_INLINE void operator()(D d, int row, int column, hn::Vec<D> w) const {
-        const size_t at = row * rowLength + column;
-        hn::StoreU(hn::MulAdd(w, fx, hn::LoadU(d, x + at)), d, x + at);
-        hn::StoreU(hn::MulAdd(w, fy, hn::LoadU(d, y + at)), d, y + at);
-        hn::StoreU(hn::MulAdd(w, fz, hn::LoadU(d, z + at)), d, z + at);
+    const Real* HWY_RESTRICT forces;
+    int particle = 0; ///< of the sphere that is visited
+
+    HWY_INLINE void operator()(size_t at, int sphere, hn::Vec<D> w) const {
+        const Real* HWY_RESTRICT force = forces + 3 * size_t(sphere);
+        hn::StoreU(hn::MulAdd(w, hn::Set(d, force[0]), hn::LoadU(d, x + at)), d, x + at);
+        hn::StoreU(hn::MulAdd(w, hn::Set(d, force[1]), hn::LoadU(d, y + at)), d, y + at);
+        hn::StoreU(hn::MulAdd(w, hn::Set(d, force[2]), hn::LoadU(d, z + at)), d, z + at);
+    }
+    HWY_INLINE void operator()(int row, int column, hn::Vec<D> w) const {
+        (*this)(row * rowLength + column, particle, w);
     }
 };
 
 /** Sums up the velocity of a sphere from three grids. */
 template <class D, class Real = hn::TFromD<D>> struct SumVelocities {
+    D d;
     size_t rowLength;
-    const Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
+    const Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< grids
     hn::Vec<D> ux, uy, uz;
-    HWY_INLINE void operator()(D d, int row, int column, hn::Vec<D> w) {
-        const size_t at = row * rowLength + column;
+    size_t plane = 0; ///< where the one that is visited starts
+
+    HWY_INLINE void operator()(size_t at, int, hn::Vec<D> w) {
         ux = hn::MulAdd(w, hn::LoadU(d, x + at), ux);
         uy = hn::MulAdd(w, hn::LoadU(d, y + at), uy);
         uz = hn::MulAdd(w, hn::LoadU(d, z + at), uz);
+    }
+    HWY_INLINE void operator()(int row, int column, hn::Vec<D> w) {
+        (*this)(plane + row * rowLength + column, 0, w);
     }
 };
 
@@ -172,23 +255,24 @@ void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
     for (int c = 0; c < 3; c++)
         for (size_t i = 0; i < rows * g.rowLength; i++)
             planes[c][i] = 0;
+    RowQueue<Real> queue;
+    AddForces<decltype(d)> add = {d, g.rowLength, planes[0], planes[1], planes[2], g.forces};
     for (int dx = 0; dx < g.widest; dx++) {
         const int column = (x - dx % g.size[0] + g.size[0]) % g.size[0];
         const int begin = g.columnStart[column * rows], end = g.columnStart[(column + 1) * rows];
         for (int particle = begin; particle < end; particle++) {
-            if (dx >= g.shapes[g.shape[particle]].extent[0])
+            const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
+            if (dx >= shape.extent[0])
                 continue;
-            const Real* HWY_RESTRICT force = g.forces + 3 * size_t(particle);
-            AddForces<decltype(d)> add = {g.rowLength,
-                                          planes[0],
-                                          planes[1],
-                                          planes[2],
-                                          hn::Set(d, force[0]),
-                                          hn::Set(d, force[1]),
-                                          hn::Set(d, force[2])};
+            if (isNarrow(d, g, shape)) {
+                queuePlane(d, g, particle, dx, 0, queue, add);
+                continue;
+            }
+            add.particle = particle;
             visitPlane(d, g, particle, dx, add);
         }
     }
+    workOff(d, g, queue, add);
     for (int c = 0; c < 3; c++)
         for (size_t y = 0; y < rows; y++) {
             Real* row = planes[c] + y * g.rowLength;
@@ -201,18 +285,23 @@ template <class Real>
 void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const grids[3],
                Real* HWY_RESTRICT u) {
     const hn::CappedTag<Real, SPHERE_LANES> d;
+    RowQueue<Real> queue;
     for (int particle = from; particle < to; particle++) {
-        SumVelocities<decltype(d)> sum = {g.rowLength, nullptr,     nullptr,    nullptr,
-                                          hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+        SumVelocities<decltype(d)> sum = {d,        g.rowLength, grids[0],    grids[1],
+                                          grids[2], hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+        const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
+        const bool narrow = isNarrow(d, g, shape);
         int x = g.first[3 * size_t(particle)];
-        for (int dx = 0; dx < g.shapes[g.shape[particle]].extent[0]; dx++) {
-            sum.x = grids[0] + x * g.planeLength;
-            sum.y = grids[1] + x * g.planeLength;
-            sum.z = grids[2] + x * g.planeLength;
-            visitPlane(d, g, particle, dx, sum);
+        for (int dx = 0; dx < shape.extent[0]; dx++) {
+            sum.plane = x * g.planeLength;
+            if (narrow)
+                queuePlane(d, g, particle, dx, x, queue, sum);
+            else
+                visitPlane(d, g, particle, dx, sum);
             if (++x == g.size[0])
                 x = 0;
         }
+        workOff(d, g, queue, sum);
         Real* const out = u + 3 * size_t(particle);
         out[0] = hn::GetLane(hn::SumOfLanes(d, sum.ux));
         out[1] = hn::GetLane(hn::SumOfLanes(d, sum.uy));
