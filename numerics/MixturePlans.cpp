@@ -239,7 +239,7 @@ Plan MixturePlans::at(double parameter) const {
     return plan;
 }
 
-Plan MixturePlans::cheapest() const {
+Plan MixturePlans::cheapest(double shortest) const {
     const PlanOverrides& wish = request.overrides;
     const bool prolate = isProlate();
     const double given = (prolate ? givenRange() : wish.xi * request.radius);
@@ -254,6 +254,8 @@ Plan MixturePlans::cheapest() const {
     for (double x = first; prolate ? x < last || x == first : x > 1 / last;
          x *= prolate ? RANGE_FACTOR : 1 / XI_FACTOR) {
         Plan plan = at(x);
+        if (plan.mixture->rangeOfPoints() <= shortest)
+            continue;
         double price = cost(plan);
         if (wish.grid[0] > 0) { // it serves only some ranges; else the smallest error is best
             plan = finished(plan, unitOf(plan));
@@ -293,16 +295,16 @@ void MixturePlans::requireTolerance(const Plan& plan) const {
     throw std::invalid_argument(message.str());
 }
 
-void MixturePlans::checkTables(Plan& plan) const {
+std::string MixturePlans::checkTables(Plan& plan) const {
     const MixtureTable table(*plan.mixture, plan.tableError);
-    plan.radiusFunctions = table.size();
+    plan.radiusFunctions = (table.interpolates() ? table.size() : 0);
     const double limit = ROUNDING_SHARE * request.tolerance;
     if (SINGLE_ROUNDING * table.magnification() > limit)
         plan.precision = Precision::Double;
     const bool single = request.singleOnly && plan.precision == Precision::Double,
                coarse = !request.directSums && DOUBLE_ROUNDING * table.magnification() > limit;
     if (!single && !coarse)
-        return;
+        return "";
     std::ostringstream message;
     message << "radii from " << composition.radii.front() * plan.a << " to "
             << composition.radii.back() * plan.a << " nm within a range of " << plan.realCutoff
@@ -311,7 +313,7 @@ void MixturePlans::checkTables(Plan& plan) const {
             << (coarse ? "double" : "single") << " precision; "
             << (coarse ? "" : "use the platform's mixed or double precision, ")
             << "use radii that differ less, or a looser tolerance";
-    throw std::invalid_argument(message.str());
+    return message.str();
 }
 
 Plan MixturePlans::refined(const Plan& plan) const {
@@ -334,14 +336,32 @@ Plan MixturePlans::refined(const Plan& plan) const {
     return other;
 }
 
-Plan MixturePlans::best() const {
-    Plan plan = refined(cheapest());
+Plan MixturePlans::finishedBeyond(double shortest) const {
+    Plan plan = cheapest(shortest);
+    if (!plan.mixture)
+        return plan;
+    plan = refined(plan);
     checkPlan(plan, request);
     plan = finished(plan, unitOf(plan));
     plan.windowSpacing = RadialWindow::spacing(box, plan.grid);
     plan.splitReason = (request.split == SplitChoice::Automatic ? "default" : "as prescribed");
     requireTolerance(plan);
-    checkTables(plan);
+    return plan;
+}
+
+Plan MixturePlans::best() const {
+    Plan plan = finishedBeyond(0);
+    const std::string obstacle = checkTables(plan);
+    std::string left = obstacle;
+    while (!left.empty() && !isPrescribed(request.overrides)) {
+        // The functions of a longer range vary less over the diameter of the largest sphere.
+        plan = finishedBeyond(plan.mixture->rangeOfPoints());
+        if (!plan.mixture)
+            break;
+        left = checkTables(plan);
+    }
+    if (!left.empty())
+        throw std::invalid_argument(obstacle);
     return plan;
 }
 

@@ -106,6 +106,24 @@ double meanNeighbours(const Lattice& box, double particles, double range) {
     return particles / box.volume() * 4.0 / 3 * M_PI * range * range * range;
 }
 
+double meanNeighbours(const Plan& plan, const Lattice& box, double particles) {
+    if (!plan.mixture)
+        return meanNeighbours(box, particles, plan.realCutoff);
+    // the mean of (R + ai + aj)^3 over all pairs, by the moments of the radii
+    double m1 = 0, m2 = 0, m3 = 0;
+    for (double a : plan.mixture->particleRadii()) {
+        m1 += a;
+        m2 += a * a;
+        m3 += a * a * a;
+    }
+    const double n = plan.mixture->particleRadii().size(), R = plan.mixture->rangeOfPoints();
+    m1 /= n;
+    m2 /= n;
+    m3 /= n;
+    const double cubes = R * R * R + 6 * R * R * m1 + 6 * R * (m2 + m1 * m1) + 2 * m3 + 6 * m1 * m2;
+    return meanNeighbours(box, particles, plan.a * std::cbrt(cubes));
+}
+
 int nextFftSize(int n) {
     for (;; n++) {
         int rest = n;

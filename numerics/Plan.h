@@ -78,7 +78,8 @@ struct Plan {
     double windowShape;      ///< beta
     /// of a mixture: the window is radial, of diameter P times this length (in units of a); else 0
     double windowSpacing;
-    int radiusFunctions;     ///< of a mixture: size of the MixtureTable, else 0
+    /// of a mixture: functions of the radius that pairs are interpolated by; 0: each has its own
+    int radiusFunctions;
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
     double windowError;      ///< absolute error allowed in the weights of the window
@@ -113,6 +114,8 @@ Plan makePlan(const PlanRequest& request);
  * @param range  in nm
  */
 double meanNeighbours(const Lattice& box, double particles, double range);
+/** The same within the range of the Plan, or, in a mixture, of each pair. */
+double meanNeighbours(const Plan& plan, const Lattice& box, double particles);
 
 /** Smallest number >= n with no prime factor above 7: sizes that every FFT library does fast. */
 int nextFftSize(int n);

@@ -191,10 +191,16 @@ private:
     Plan at(double parameter) const;
     void setRange(Plan& plan, double R) const;
     double unitOf(const Plan& plan) const;
-    Plan cheapest() const;
+    /** Of ranges of point forces beyond `shortest`; without a mixture if there is none. */
+    Plan cheapest(double shortest) const;
     void requireTolerance(const Plan& plan) const;
-    /** The arithmetic that the tables need. */
-    void checkTables(Plan& plan) const;
+    /**
+     * Set the arithmetic that the tables need.
+     * @return why none that the platform has suffices; "" if one does
+     */
+    std::string checkTables(Plan& plan) const;
+    /** The cheapest one, finished; its tables are not looked at. */
+    Plan finishedBeyond(double shortest) const;
 
     Composition composition;
     std::vector<double> radii; ///< of particles, in the unit

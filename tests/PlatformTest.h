@@ -139,6 +139,7 @@ struct Settings {
     OpenMM::Force* (*force)(int particles) = nullptr;     ///< makes what the System takes over
     int seed = 7;
     double temperature = TEMPERATURE;
+    vector<double> radii = {}; ///< empty: RADIUS each
 };
 
 /** A Context on one platform, with all that it needs. */
@@ -158,6 +159,8 @@ public:
         if (settings.parameters != nullptr)
             integrator.setNumericalParameters(*settings.parameters);
         integrator.setRandomNumberSeed(settings.seed);
+        for (size_t i = 0; i < settings.radii.size(); i++)
+            integrator.setParticleRadius(static_cast<int>(i), settings.radii[i]);
         context.reset(new OpenMM::Context(
             system, integrator, OpenMM::Platform::getPlatformByName(platform), properties));
         context->setPositions(positions);

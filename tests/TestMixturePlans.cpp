@@ -186,6 +186,7 @@ TEST(MixtureTable, MagnificationDecidesThePrecision) {
     const Plan plan = makePlan(wide);
     const MixtureTable table(*plan.mixture, plan.tableError);
     EXPECT_EQ(plan.radiusFunctions, table.size());
+    EXPECT_EQ(makePlan(request({1, 2, 2}, 0.1, 1e-3)).radiusFunctions, 0); // each its own
     EXPECT_EQ(plan.precision == Precision::Double, 6e-8 * table.magnification() > 1e-5);
     PlanRequest extreme = request({1, 1, 1, 100, 100, 100}, 0.05, 1e-6);
     EXPECT_EQ(refusal(extreme), ""); // with a range of the size of the larger ones
@@ -195,6 +196,30 @@ TEST(MixtureTable, MagnificationDecidesThePrecision) {
         EXPECT_NE(message.find(word), std::string::npos) << message;
     extreme.directSums = true; // by Clenshaw's recurrence
     EXPECT_EQ(refusal(extreme), "");
+}
+
+// With the cheapest range, sizes 1:10 want double precision at 1e-3; a longer one serves.
+TEST(MixturePlans, ARangeThatThePlatformCannotServeIsPassedOver) {
+    for (double tolerance : {1e-2, 1e-3}) {
+        PlanRequest r = request(alternating(0.25, 2.5, 120, 10), 0.25, tolerance);
+        r.split = SplitChoice::Hasimoto;
+        r.singleOnly = true;
+        const Plan plan = makePlan(r);
+        EXPECT_EQ(plan.precision, Precision::Single) << tolerance;
+        EXPECT_LE(plan.predictedError, tolerance);
+    }
+}
+
+TEST(MixturePlans, NeighboursAreCountedByTheRangesOfAllPairs) {
+    const PlanRequest r = request(alternating(0.5, 5, 400, 20), 0.1, 1e-3);
+    const Plan plan = makePlan(r);
+    double pairs = 0;
+    for (double ai : plan.mixture->particleRadii())
+        for (double aj : plan.mixture->particleRadii())
+            pairs += 4 * M_PI / 3 * std::pow(plan.a * plan.mixture->range(ai, aj), 3);
+    EXPECT_NEAR(meanNeighbours(plan, r.box, 400), pairs / r.box.volume() / 400,
+                1e-10 * pairs / r.box.volume() / 400);
+    EXPECT_LT(meanNeighbours(plan, r.box, 400), 0.8 * meanNeighbours(r.box, 400, plan.realCutoff));
 }
 
 TEST(MixtureErrors, WaveErrorBoundsTheMeasuredError) {

@@ -68,10 +68,10 @@ void describeRadii(std::ostream& out, const Scene& scene, const NumericalParamet
         return;
     out << "unequal radii: " << distinct.size() << " distinct, from " << *distinct.begin() << " to "
         << *distinct.rbegin() << " nm, because setParticleRadius was called";
-    if (p.radiusFunctions == static_cast<int>(distinct.size()))
-        out << "; each is a class of its own";
-    else if (p.radiusFunctions > 0)
+    if (p.radiusFunctions > 0)
         out << "; pairs are interpolated by " << p.radiusFunctions << " functions of the radius";
+    else if (p.realCutoff > 0)
+        out << "; each is a class of its own";
     out << endl;
 }
 

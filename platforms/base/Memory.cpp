@@ -20,7 +20,7 @@ void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, siz
     const double available = USABLE * memory.bytes;
     const double grid = use.perGridPoint * plan.gridPoints();
     const double range = plan.realCutoff;
-    const double neighbours = numerics::meanNeighbours(box, particles, range);
+    const double neighbours = numerics::meanNeighbours(plan, box, particles);
     const double pairs = use.perOrderedPair * particles * neighbours;
     const double rest = use.perParticle * particles;
     if (grid + pairs + rest <= available)

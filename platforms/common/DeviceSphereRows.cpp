@@ -93,7 +93,8 @@ double DeviceSphereRows::bytesPerParticle(const Plan& plan, const Lattice& box, 
         entries += sizes.groups[g].count * firstCapacity(sizes, g, plan, box);
     const double entry = (plan.sumImages ? sizeof(mm_int2) : sizeof(int)) + 2 * realSize;
     const double n = plan.mixture->particleRadii().size(), kinds = plan.mixture->radii().size();
-    return (entries * entry + kinds * (1 + plan.radiusFunctions) * realSize) / n;
+    const int weights = std::max(plan.radiusFunctions, MixtureTable::MOST_CLASSES);
+    return (entries * entry + kinds * (1 + weights) * realSize) / n;
 }
 
 /** Tell the device how long rows are. @return entries of all of them */

@@ -43,7 +43,7 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
     /// seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
     int randomSeed = 0;
     std::string splitReason; ///< why this split, in the words of describe() (never set)
-    /// functions of the radius behind pairs of unequal spheres, 0 for equal ones (never set)
+    /// functions of the radius that interpolate pairs of unequal spheres; 0: none do (never set)
     int radiusFunctions = 0;
 };
 
