@@ -168,6 +168,14 @@ def testALatticeUnderShearIsPeriodic(platformName):
     assert abs(boxOf(context)[1, 0]) < 1e-9
 
 
+def forceCoupling(i):
+    i.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)
+
+
+def unbounded(i):
+    i.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
+
+
 def mixtureOfTwo():
     return scenes.mixture(np.where(np.arange(24) % 5 == 0, 0.8, 0.4), 0.1, barelyTilted(scenes.cube(1.0)), 4)
 
@@ -175,8 +183,8 @@ def mixtureOfTwo():
 @pytest.mark.onePrecision
 @pytest.mark.parametrize("scene, more", [
     (suspension, None), (mixtureOfTwo, None), (suspension, freeDraining),
-    (suspension, lambda i: i.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)),
-    (suspension, lambda i: i.setFluidBoundary(PSEBrownianIntegrator.Unbounded))])
+    (suspension, forceCoupling), (suspension, unbounded),
+    (mixtureOfTwo, lambda i: (forceCoupling(i), unbounded(i)))])
 def testStepsAreThoseOfReference(platformName, scene, more):
     """
     Positions, velocities and box after steps past a flip, whatever the fluid: each step is exact to the
