@@ -165,12 +165,13 @@ HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row
 
 /** Two rows at once: what is loaded and stored of a column serves both. */
 template <class Law, Scalars SCALARS, class Real>
-void addRowsAny(const AllPairs<Real>& p, int from, int to, const Real* HWY_RESTRICT v,
+void addRowsAny(const AllPairs<Real>& given, int from, int to, const Real* HWY_RESTRICT v,
                 Real* HWY_RESTRICT sums, Real* HWY_RESTRICT record) {
     const hn::CappedTag<Real, ALL_PAIRS_LANES> d;
     using V = hn::Vec<decltype(d)>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const Law law;
+    const AllPairs<Real> p = given; // no store below can change it
     const size_t y = p.stride, z = 2 * size_t(p.stride);
     for (int i = from; i < to; i += 2) {
         const Row<Real> first(p, i, v), second(p, i + 1, v);

@@ -67,7 +67,7 @@ private:
     double planeMetric[3];
     std::unique_ptr<CpuMixturePairs<Real>> mixture; ///< NULL for equal radii
     Real self = 0;                                  ///< of equal radii
-    Vector coefficientsF, coefficientsC;
+    std::vector<Real> coefficientsF, coefficientsC;
     double reach[3];  ///< of the range, in fractions of the box
     int cellCount[3]; ///< cells along the box vectors
     std::vector<int> particleAt, cellOf, cellStart;

@@ -25,7 +25,7 @@ public:
     int lanczosIterations() const override { return iterations; }
 
 private:
-    using Vector = std::vector<Real>;
+    using Vector = AlignedVector<Real>;
     void multiply(const std::vector<numerics::Vec3>& forces, double unit);
     void drawNoise(const Thermal& thermal);
 

@@ -2,6 +2,7 @@
 #ifndef OPENMMPSE_KRYLOVVECTORS_H_
 #define OPENMMPSE_KRYLOVVECTORS_H_
 
+#include "AlignedVector.h"
 #include "PairKernels.h"
 #include "Threads.h"
 #include <algorithm>
@@ -16,7 +17,7 @@ namespace PSE {
  */
 template <class Real> class KrylovVectors {
 public:
-    using Vector = std::vector<Real>;
+    using Vector = AlignedVector<Real>;
 
     explicit KrylovVectors(const Threads& threads) : threads(threads) {}
     /** @param places  n */
