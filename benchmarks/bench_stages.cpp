@@ -46,8 +46,9 @@ std::vector<Vec3> fractionsOf(const Arguments& arguments) {
 template <class Real> struct RealHalf {
     explicit RealHalf(const Arguments& arguments)
         : plan(planFor(arguments)), fractions(fractionsOf(arguments)), pool(arguments.threads),
-          threads(pool, false), half(plan, arguments.box(), threads),
-          v(randomNumbers<Real>(3 * fractions.size() + 1)), out(3 * fractions.size()) {
+          threads(pool, false), half(plan, arguments.box(), threads), out(3 * fractions.size()) {
+        const std::vector<Real> numbers = randomNumbers<Real>(3 * fractions.size() + 1);
+        v.assign(numbers.begin(), numbers.end());
         half.setPositions(fractions);
     }
     Plan plan;
@@ -55,7 +56,7 @@ template <class Real> struct RealHalf {
     OpenMM::ThreadPool pool;
     Threads threads;
     CpuRealSpace<Real> half;
-    std::vector<Real> v, out;
+    AlignedVector<Real> v, out;
 };
 
 /** Call work(Real()) with the precision that the Plan asks for. */

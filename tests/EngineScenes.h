@@ -49,7 +49,7 @@ template <class Real>
 std::vector<PSE::numerics::Vec3> realProduct(PSE::CpuRealSpace<Real>& space,
                                              const std::vector<PSE::numerics::Vec3>& forces) {
     const size_t n = forces.size();
-    std::vector<Real> f(3 * n + 1), out(3 * n);
+    PSE::AlignedVector<Real> f(3 * n + 1), out(3 * n);
     for (size_t place = 0; place < n; place++)
         for (int c = 0; c < 3; c++)
             f[3 * place + c] = Real(forces[space.order()[place]][c]);

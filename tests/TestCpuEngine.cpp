@@ -2,10 +2,12 @@
 // The CPU engine on every instruction set that this machine has, and for any number of threads.
 #include "CpuEngine.h"
 #include "EngineScenes.h"
+#include "Memory.h"
 #include "ParticleOrder.h"
 #include "WaveKernels.h"
 #include "numerics/Plan.h"
 #include "numerics/RealTable.h"
+#include "openmm/OpenMMException.h"
 #include <gtest/gtest.h>
 #include <memory>
 #include <random>
@@ -242,4 +244,19 @@ TEST(CpuEngine, NoTimeIsChargedToNoiseThatIsAbsent) {
     ASSERT_FALSE(clock.times().empty());
     for (const StageTime& stage : clock.times())
         EXPECT_EQ(std::string(stage.stage).find("Lanczos"), std::string::npos) << stage.stage;
+}
+
+/** Room for the vectors of the Lanczos process, or a refusal with numbers and remedy. */
+TEST(Memory, OfAnUnboundedFluidGrowsWithItsParticles) {
+    const Memory small = {1e9, "machine"};
+    EXPECT_NO_THROW(requireMemory(300000, 12, 1000, small)); // 0.36 and 0.3 of 0.8 GB
+    try {
+        requireMemory(400000, 12, 1000, small);
+        FAIL() << "0.88 GB of 0.8 GB were granted";
+    } catch (const OpenMM::OpenMMException& refusal) {
+        const std::string text = refusal.what();
+        for (const char* words : {"unbounded fluid of 400000 particles", "0.48 GB", "0.4 GB",
+                                  "0.8 GB can be used", "fewer particles"})
+            EXPECT_NE(text.find(words), std::string::npos) << words << " in " << text;
+    }
 }

@@ -343,7 +343,12 @@ def testTuningKeepsTheTolerance():
 @pytest.fixture
 def files(small, tmp_path):
     """Paths of SYSTEM.xml, STATE.xml and INTEGRATOR.xml of the small scene."""
-    context, integrator = scenes.makeContext(small, "CPU", temperature=TEMPERATURE, forces=[springs(small)])
+    return filesOf(small, tmp_path, lambda integrator: None)
+
+
+def filesOf(small, tmp_path, configure):
+    context, integrator = scenes.makeContext(small, "CPU", temperature=TEMPERATURE, forces=[springs(small)],
+                                             configure=configure)
     contents = context.getSystem(), context.getState(positions=True), integrator
     paths = [tmp_path/name for name in ("system.xml", "state.xml", "integrator.xml")]
     for path, content in zip(paths, contents):
@@ -369,6 +374,29 @@ def testCommandWritesTablePictureAndNumbers(files, tmp_path, capsys):
     assert float(rows[2]["error_random"]) < 1e-2*float(rows[0]["error_random"])
     marked = [line for line in printed.splitlines() if line.endswith("<- recommended")]
     assert len(marked) == sum(row["recommended"] == "1" for row in rows) <= 1
+
+
+def testCommandOnSplitsThatAreNone(small, tmp_path, capsys):
+    """An unbounded fluid, and force coupling by waves alone: no splitting parameter, which tuning leaves out."""
+    def unbounded(integrator):
+        integrator.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
+
+    def waves(integrator):
+        integrator.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)
+        integrator.setSplit(PSEBrownianIntegrator.AllWaves)
+    for name, configure in (("none", unbounded), ("AllWaves", waves)):
+        paths, out = filesOf(small, tmp_path, configure), tmp_path/name
+        split = [] if name == "none" else ["--split", name]
+        assert accuracy.main([*paths, "--output", str(out), *SMALL, *split, "--tolerances", "1e-1", "1e-3"]) == 0
+        with open(out/"accuracy.csv") as file:
+            rows = list(csv.DictReader(file))
+        assert [row["split"] for row in rows] == [name, name]
+        for row, tolerance in zip(rows, (1e-1, 1e-3)):
+            assert 0 < float(row["error_random"]) <= tolerance
+        capsys.readouterr()
+        assert accuracy.main([*paths, "--output", str(out), "--tune", *SMALL, *split]) == 0
+        printed = capsys.readouterr().out
+        assert "<- best" in printed and "xi x" not in printed and "left out" not in printed
 
 
 def testOptionsReplaceTheIntegrator(files, tmp_path, capsys):

@@ -39,4 +39,19 @@ void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, siz
     throw OpenMM::OpenMMException(message.str());
 }
 
+void requireMemory(size_t particles, double perVector, double perParticle, const Memory& memory) {
+    const double available = USABLE * memory.bytes;
+    const double vectors = EXPECTED_KRYLOV_VECTORS * perVector * particles;
+    const double rest = perParticle * particles;
+    if (vectors + rest <= available)
+        return;
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: an unbounded fluid of " << particles << " particles needs "
+            << vectors / GIGABYTE << " GB of memory for " << EXPECTED_KRYLOV_VECTORS
+            << " vectors of the Lanczos process and " << rest / GIGABYTE << " GB besides; "
+            << available / GIGABYTE << " GB can be used (" << 100 * USABLE << " % of the "
+            << memory.owner << "'s); use fewer particles";
+    throw OpenMM::OpenMMException(message.str());
+}
+
 } // namespace PSE

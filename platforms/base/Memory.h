@@ -28,6 +28,17 @@ Memory machineMemory();
 void requireMemory(const numerics::Plan& plan, const numerics::Lattice& box, size_t particles,
                    const MemoryUse& use, const Memory& memory = machineMemory());
 
+/// Krylov vectors that an unbounded fluid must have room for; chains of 10,000 take 70.
+constexpr int EXPECTED_KRYLOV_VECTORS = 100;
+
+/**
+ * The same of an unbounded fluid, which has neither a grid nor lists of neighbours: what it
+ * allocates grows with the number of particles alone.
+ * @param perVector  bytes of a Krylov vector per particle; perParticle: what there is besides
+ */
+void requireMemory(size_t particles, double perVector, double perParticle,
+                   const Memory& memory = machineMemory());
+
 } // namespace PSE
 
 #endif

@@ -176,6 +176,8 @@ void CommonStepKernel::useUnbounded(const UnboundedPlan& plan) {
                 << "; set the platform property Precision to double, or loosen the tolerance";
         throw OpenMMException(message.str());
     }
+    if (device.getIsCPU())
+        requireMemory(scene.mobile.size(), 4 * realSize(device), 12 * realSize(device));
     ContextSelector selector(device);
     engine.reset(new DeviceUnbounded(programs, static_cast<int>(masses.size()), scene.mobile, plan,
                                      scene.radii, viscosity, clock));

@@ -8,9 +8,6 @@ using namespace PSE::numerics;
 namespace PSE {
 
 namespace {
-/// Slabs, and so tasks of threads: enough for many threads, and short sums in single precision;
-/// few for memory, and for the time it takes to add them up.
-constexpr int PARTICLES_PER_SLAB = 100, MOST_SLABS = 64;
 constexpr double MOST_RECORDED = 64e6; ///< bytes: 4000 particles in single precision
 
 PairLaw lawOf(const UnboundedPlan& plan) {

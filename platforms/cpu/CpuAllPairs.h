@@ -25,6 +25,11 @@ namespace PSE {
 template <class Real> class CpuAllPairs : public KrylovVectors<Real> {
 public:
     using typename KrylovVectors<Real>::Vector;
+    /// Slabs, and so tasks of threads: enough for many threads, and short sums in single precision;
+    /// few for memory, and for the time it takes to add them up.
+    static constexpr int PARTICLES_PER_SLAB = 100, MOST_SLABS = 64;
+    /// beside the record of pairs
+    static constexpr double BYTES_PER_PARTICLE = (3 * MOST_SLABS + 8) * sizeof(Real);
 
     /**
      * @param radii      of the particles (nm)

@@ -15,6 +15,9 @@ namespace PSE {
  */
 template <class Real> class CpuUnbounded : public MobilityEngine {
 public:
+    /// at most, beside Krylov vectors and the bounded record of pairs
+    static constexpr double BYTES_PER_PARTICLE =
+        CpuAllPairs<Real>::BYTES_PER_PARTICLE + 9 * sizeof(Real) + sizeof(numerics::Vec3);
     /** @param radii  of the mobile particles (nm) */
     CpuUnbounded(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
                  double viscosity, const std::vector<int>& indices, OpenMM::ThreadPool& pool,

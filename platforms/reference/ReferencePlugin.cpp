@@ -45,6 +45,8 @@ public:
                                                     double viscosity,
                                                     const std::vector<int>& indices,
                                                     StageClock& clock) const override {
+        // positions, radii, noise and two velocities besides
+        requireMemory(indices.size(), sizeof(numerics::Vec3), 5 * sizeof(numerics::Vec3));
         return std::unique_ptr<MobilityEngine>(
             new ReferenceUnbounded(plan, radii, viscosity, indices, clock));
     }

@@ -57,13 +57,19 @@ public:
                                                     const std::vector<int>& indices,
                                                     StageClock& clock) const override {
         if (plan.precision == numerics::Precision::Single)
-            return std::unique_ptr<MobilityEngine>(
-                new CpuUnbounded<float>(plan, radii, viscosity, indices, pool, clock));
-        return std::unique_ptr<MobilityEngine>(
-            new CpuUnbounded<double>(plan, radii, viscosity, indices, pool, clock));
+            return makeUnbounded<float>(plan, radii, viscosity, indices, clock);
+        return makeUnbounded<double>(plan, radii, viscosity, indices, clock);
     }
 
 private:
+    template <class Real>
+    std::unique_ptr<MobilityEngine>
+    makeUnbounded(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
+                  double viscosity, const std::vector<int>& indices, StageClock& clock) const {
+        requireMemory(indices.size(), 3 * sizeof(Real), CpuUnbounded<Real>::BYTES_PER_PARTICLE);
+        return std::unique_ptr<MobilityEngine>(
+            new CpuUnbounded<Real>(plan, radii, viscosity, indices, pool, clock));
+    }
     template <class Real>
     std::unique_ptr<MobilityEngine> make(const numerics::Plan& plan, const numerics::Lattice& box,
                                          double viscosity, const std::vector<int>& indices,

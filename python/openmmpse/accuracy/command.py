@@ -54,7 +54,7 @@ def _parser():
                         help="displacements count as independent after it (default: a^2/D0)")  # fmt: skip
     parser.add_argument("--tolerances", type=float, nargs="+", metavar="TOL",
                         help="default: 1e-1 to 1e-8; with --tune one, default 1e-3")  # fmt: skip
-    parser.add_argument("--split", choices=("automatic", "Hasimoto", "Prolate", "both"), default="automatic")
+    parser.add_argument("--split", choices=("automatic", "Hasimoto", "Prolate", "AllWaves", "both"), default="automatic")
     parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
                         help="for the tight run that errors are measured against (default: %(default)s)")  # fmt: skip
     parser.add_argument(

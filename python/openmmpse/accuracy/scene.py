@@ -19,7 +19,9 @@ MOST_FOR_REFERENCE = 2000  #: particles; direct sums over modes take seconds a s
 BOLTZMANN = (unit.BOLTZMANN_CONSTANT_kB * unit.AVOGADRO_CONSTANT_NA).value_in_unit(
     unit.kilojoule_per_mole / unit.kelvin
 )
-SPLITS = {"automatic": "AutomaticSplit", "Hasimoto": "Hasimoto", "Prolate": "Prolate"}
+#: the names of splits as they are asked for and as getNumericalParameters() has them; an unbounded fluid has none
+SPLITS = {"automatic": "AutomaticSplit", "Hasimoto": "Hasimoto", "Prolate": "Prolate", "AllWaves": "AllWaves",
+          "none": "AutomaticSplit"}
 
 
 class SceneError(ValueError):

@@ -32,7 +32,7 @@ def measure(source, positions=None, integrator=None, *, box=None, platform=None,
     box, platform, properties   as `Scene` takes them; default: those of the source
     runLength        steps of the run that is planned: decides how large its statistical error will be
     tolerances       to measure
-    split            "automatic", "Hasimoto", "Prolate", or "both" for the last two
+    split            "automatic", "Hasimoto", "Prolate", "AllWaves", or "both" for Hasimoto and Prolate
     correlationTime  ps after which displacements of a particle count as independent; default: a^2/D0
     budget           seconds that the tight run may take by estimate; if it would take more, a looser one is the
                      reference, and tolerances less than ten times looser than that are left out

@@ -94,7 +94,7 @@ def _candidates(used):
     """`Candidate`s around the parameters in use, the automatic one first."""
     split, xi, support = used["split"], used["xi"], used["windowSupport"]
     yield Candidate("automatic", {})
-    for factor in FACTORS:
+    for factor in FACTORS if xi else ():  # waves alone, and the unbounded fluid, are not divided
         if factor != 1:
             yield Candidate(f"xi x {factor:g}", {"split": split, "xi": float(f"{factor * xi:.4g}")})
     for change in SUPPORTS if support else ():
