@@ -61,7 +61,10 @@ def namesFor(chosen, marks):
 def pytest_generate_tests(metafunc):
     chosen = chosenNames(metafunc.config)
     if "platformName" in metafunc.fixturenames:
-        names = namesFor(chosen, {mark.name for mark in metafunc.definition.iter_markers()})
+        marks = {mark.name for mark in metafunc.definition.iter_markers()}
+        if "hardCase" in metafunc.fixturenames and not metafunc.config.getoption("long"):
+            marks.add("onePrecision")
+        names = namesFor(chosen, marks)
         metafunc.parametrize("platformName", names or [NOWHERE], scope="session")
     if "device" in metafunc.fixturenames:
         devices = [device for device in DEVICES if device in map(familyOf, chosen)]

@@ -7,6 +7,7 @@
 
 #include "StageClock.h"
 #include "Thermal.h"
+#include "VectorConversion.h"
 #include "numerics/Plan.h"
 #include "numerics/UnboundedPlan.h"
 #include "openmmpse/PSEKernels.h"
@@ -14,10 +15,6 @@
 #include <optional>
 
 namespace PSE {
-
-inline numerics::Vec3 fromOpenMM(const OpenMM::Vec3& v) {
-    return numerics::Vec3(v[0], v[1], v[2]);
-}
 
 /** What is checked for being finite, in the words of its refusal. */
 struct CheckedQuantity {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "StrainedContext.h"
+#include "VectorConversion.h"
 #include "openmm/Context.h"
 #include "openmm/OpenMMException.h"
 #include "openmm/Platform.h"
@@ -12,14 +13,6 @@ using OpenMM::OpenMMException;
 using OmmVec3 = OpenMM::Vec3;
 
 namespace PSE {
-
-namespace {
-
-OmmVec3 toOpenMM(const Vec3& v) {
-    return OmmVec3(v[0], v[1], v[2]);
-}
-
-} // namespace
 
 StrainedContext::StrainedContext(OpenMM::ContextImpl& context, const Lattice& box, int groups)
     : context(context), box(box), groups(groups) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "NeighbourListKeeper.h"
+#include "VectorConversion.h"
 #include <algorithm>
 #include <cmath>
 
@@ -21,10 +22,6 @@ constexpr double ROUNDING = 1e-6;
 /// In a slot of the thread's forces that no Force reads: every evaluation sets it to zero.
 constexpr float MARK = 2.9e38f;
 constexpr int MARKED_SLOT = 3;
-
-Vec3 fromOpenMM(const OmmVec3& v) {
-    return Vec3(v[0], v[1], v[2]);
-}
 
 } // namespace
 

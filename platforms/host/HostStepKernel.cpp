@@ -11,14 +11,6 @@ using OmmVec3 = OpenMM::Vec3;
 
 namespace PSE {
 
-namespace {
-
-OmmVec3 toOpenMM(const Vec3& v) {
-    return OmmVec3(v[0], v[1], v[2]);
-}
-
-} // namespace
-
 HostStepKernel::HostStepKernel(string name, const OpenMM::Platform& platform,
                                OpenMM::ReferencePlatform::PlatformData& data,
                                std::unique_ptr<EngineFactory> factory)
