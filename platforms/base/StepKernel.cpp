@@ -246,10 +246,8 @@ Matrix3 PlannedStepKernel::interparticleStress(ContextImpl& context, int groups)
     if (!boxCanTilt())
         throw OpenMMException(
             "PSEBrownianIntegrator: computeStress: the box of the System is rectangular, and on "
-            "this "
-            "platform OpenMM computes no Force in a sheared box then; tilt the default box a "
-            "little "
-            "before the Context is created (System.setDefaultPeriodicBoxVectors with "
+            "this platform OpenMM computes no Force in a sheared box then; tilt the default box a "
+            "little before the Context is created (System.setDefaultPeriodicBoxVectors with "
             "b.x = 1e-3 a.x, say), or use the platform CPU");
     const Lattice box = currentBox();
     straining = true;

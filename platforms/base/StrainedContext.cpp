@@ -10,7 +10,6 @@
 
 using namespace PSE::numerics;
 using OpenMM::OpenMMException;
-using OmmVec3 = OpenMM::Vec3;
 
 namespace PSE {
 
@@ -32,10 +31,8 @@ double StrainedContext::energy(const Matrix3& map) {
     const Matrix3 edges = box.deformed(map).vectors();
     context.setPeriodicBoxVectors(toOpenMM(edges.col(0)), toOpenMM(edges.col(1)),
                                   toOpenMM(edges.col(2)));
-    for (size_t i = 0; i < positions.size(); i++) {
-        const OmmVec3& x = positions[i];
-        moved[i] = toOpenMM(map * Vec3(x[0], x[1], x[2]));
-    }
+    for (size_t i = 0; i < positions.size(); i++)
+        moved[i] = toOpenMM(map * fromOpenMM(positions[i]));
     context.setPositions(moved);
     context.computeVirtualSites();
     const double value = context.calcForcesAndEnergy(false, true, groups);

@@ -5,8 +5,8 @@ import openmm
 import pytest
 
 import scenes
-from platformnames import isDevice, isDirect
-from scenes import KB, errorOf, makeContext, stored
+from platformnames import isDirect
+from scenes import KB, errorOf, makeContext
 
 RADIUS = 0.5
 TEMPERATURE = 300.0

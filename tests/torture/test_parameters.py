@@ -7,7 +7,7 @@ import pytest
 import openmmpse
 import scenes
 from platformnames import coordinateRounding, isDevice, lowestTolerance, served
-from scenes import KB, errorOf, errorRatio, forceKinds, makeContext, stored
+from scenes import KB, errorOf, forceKinds, makeContext, stored
 
 RADIUS = 0.5
 SPLITS = {"Prolate": openmmpse.PSEBrownianIntegrator.Prolate,
