@@ -117,7 +117,7 @@ function(pse_platform_test name)
         string(REPLACE "." ";" arguments ${run})
         add_test(NAME ${name}.${run} COMMAND ${name} ${arguments})
         set_tests_properties(${name}.${run} PROPERTIES
-            TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT "${PSE_PLUGIN_ENVIRONMENT}")
+            TIMEOUT ${PSE_LONGEST_RUN} SKIP_RETURN_CODE 77 ENVIRONMENT "${PSE_PLUGIN_ENVIRONMENT}")
     endforeach()
 endfunction()
 
@@ -129,6 +129,17 @@ function(pse_tests folder)
     # escaped: a ":" separates folders for OpenMM, a ";" would separate CMake's list
     set(PSE_PLUGIN_ENVIRONMENT
         "OPENMM_PLUGIN_DIR=${OPENMM_DIR}/lib/plugins:${PSE_PLUGIN_OUTPUT_DIR}")
+    set(PSE_LONGEST_CASE 300) # seconds
+    set(PSE_LONGEST_RUN 900)
+    if(PSE_SANITIZE)
+        set(PSE_LONGEST_CASE 1500) # sanitizers are slow
+        set(PSE_LONGEST_RUN 3000)
+        # neither drivers of devices nor an installed openmmpse without sanitizers
+        file(MAKE_DIRECTORY ${PSE_PLUGIN_OUTPUT_DIR})
+        file(CREATE_LINK ${OPENMM_DIR}/lib/plugins/libOpenMMCPU.so
+            ${PSE_PLUGIN_OUTPUT_DIR}/libOpenMMCPU.so SYMBOLIC)
+        set(PSE_PLUGIN_ENVIRONMENT "OPENMM_PLUGIN_DIR=${PSE_PLUGIN_OUTPUT_DIR}")
+    endif()
     file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/Test*.cpp)
     foreach(source IN LISTS sources)
         get_filename_component(name ${source} NAME_WE)
@@ -156,7 +167,7 @@ function(pse_tests folder)
         endif()
         target_link_libraries(${name} PRIVATE GTest::gtest_main)
         gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
-            PROPERTIES TIMEOUT 300 ENVIRONMENT "${environment}")
+            PROPERTIES TIMEOUT ${PSE_LONGEST_CASE} ENVIRONMENT "${environment}")
     endforeach()
     add_test(NAME layers
         COMMAND ${Python_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/check_layers.py)
