@@ -47,6 +47,13 @@ mm_int4 cellsFor(const numerics::Lattice& box, double range, int particles) {
     return mm_int4(count[0], count[1], count[2], 0);
 }
 
+/** What a float leaves of it. */
+double restOf(double value) {
+    const volatile float rounded =
+        static_cast<float>(value); // GCC 12 makes zeros of pairs of these
+    return value - rounded;
+}
+
 } // namespace
 
 DevicePlaces::DevicePlaces(DevicePrograms& programs, int particles, const std::vector<int>& mobile,
@@ -133,8 +140,14 @@ void DevicePlaces::sortByCells() {
     const numerics::Matrix3& v = inverseBox;
     const Mixed4 inverseX = {v(0, 0), v(0, 1), v(0, 2), 0};
     const Mixed4 inverseYZ = {v(1, 1), v(1, 2), v(2, 2), 0};
+    const Real4 restX = {restOf(v(0, 0)), restOf(v(0, 1)), restOf(v(0, 2)), 0};
+    const Real4 restYZ = {restOf(v(1, 1)), restOf(v(1, 2)), restOf(v(2, 2)), 0};
     const auto locate = [&](auto&&... cells) {
-        if (context.getUseMixedPrecision())
+        if (!mixedIsDouble(context))
+            locateParticles(numParticles, numParticles, cells..., context.getPosq(),
+                            context.getAtomIndexArray(), rankOf, inverseX, inverseYZ, located, keys,
+                            slotOf, restX, restYZ);
+        else if (context.getUseMixedPrecision())
             locateParticles(numParticles, numParticles, cells..., context.getPosq(),
                             context.getAtomIndexArray(), rankOf, inverseX, inverseYZ, located, keys,
                             slotOf, context.getPosqCorrection());

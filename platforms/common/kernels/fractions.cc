@@ -30,6 +30,25 @@ DEVICE fraction toFraction(mixed s) {
     return (fraction) (s*(mixed) FRACTIONS);
 }
 
+#if !defined(USE_DOUBLE_PRECISION) && !defined(USE_MIXED_PRECISION)
+/** What s has beyond a whole number, which may be any number; 0 of what is not a number. */
+DEVICE fraction toFixedPoint(real s) {
+    s -= rint(s);
+    return fabs(s) <= (real) 0.5 ? (fraction) (mm_long) rint(s*(real) FRACTIONS) : 0;
+}
+
+/**
+ * The same of inverse times a coordinate, in floats, to 2^-26 of the box vector besides 2^-48 of the
+ * product: a product of a million box lengths keeps no place in the box [T56]. Whole box vectors go
+ * before it is rounded; fma() does so whether or not a compiler contracts what is around it.
+ * @param inverse  two floats of which it is the sum, the second one below half a unit in the last
+ * place of the first
+ */
+DEVICE fraction fractionOfProduct(real inverse, real rest, real x) {
+    return toFixedPoint(fma(inverse, x, -rint(inverse*x)))+toFixedPoint(fma(rest, x, -rint(rest*x)));
+}
+#endif
+
 DEVICE real fromFraction(fraction f) {
     return f*(real) (1/FRACTIONS);
 }

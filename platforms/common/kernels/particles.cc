@@ -17,6 +17,7 @@
  * @param groupOf  by that number
  * @param inverseX, inverseYZ  the inverse of the box, a triangle: its first row; of the second y and
  * z, of the third z
+ * @param restX, restYZ  in single precision: what floats have left of it
  */
 KERNEL void locateParticles(int numAtoms,
 #ifdef SIZE_GROUPS
@@ -30,22 +31,31 @@ KERNEL void locateParticles(int numAtoms,
         GLOBAL mm_ulong* RESTRICT keys, GLOBAL int* RESTRICT slotOf
 #ifdef USE_MIXED_PRECISION
         , GLOBAL const real4* RESTRICT posqCorrection
+#elif !defined(USE_DOUBLE_PRECISION)
+        , real4 restX, real4 restYZ
 #endif
         ) {
     for (int slot = GLOBAL_ID; slot < numAtoms; slot += GLOBAL_SIZE) {
         const real4 p = posq[slot];
         mixed x = p.x, y = p.y, z = p.z;
+        fraction4 s;
+#if !defined(USE_DOUBLE_PRECISION) && !defined(USE_MIXED_PRECISION)
+        s.x = fractionOfProduct(inverseX.x, restX.x, x)+fractionOfProduct(inverseX.y, restX.y, y)+
+                fractionOfProduct(inverseX.z, restX.z, z);
+        s.y = fractionOfProduct(inverseYZ.x, restYZ.x, y)+fractionOfProduct(inverseYZ.y, restYZ.y, z);
+        s.z = fractionOfProduct(inverseYZ.z, restYZ.z, z);
+#else
 #ifdef USE_MIXED_PRECISION
         const real4 correction = posqCorrection[slot];
         x += correction.x;
         y += correction.y;
         z += correction.z;
 #endif
-        const int particle = atomIndex[slot];
-        fraction4 s;
         s.x = toFraction(inverseX.x*x+inverseX.y*y+inverseX.z*z);
         s.y = toFraction(inverseYZ.x*y+inverseYZ.y*z);
         s.z = toFraction(inverseYZ.z*z);
+#endif
+        const int particle = atomIndex[slot];
         s.w = particle;
         located[slot] = s;
         slotOf[particle] = slot;
