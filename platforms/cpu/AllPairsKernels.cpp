@@ -92,9 +92,9 @@ struct GaussianEnvelopes {
 
 /**
  * Where F and C come from: from the law alone, or with a record of them for later, or from that
- * record.
+ * record; then perhaps with displacements by the first numbers of coordinates alone.
  */
-enum class Scalars { Evaluated, Recorded, Replayed };
+enum class Scalars { Evaluated, Recorded, Replayed, ReplayedNear };
 
 /** What the loop over columns needs to know of its row. */
 template <class Real> struct Row {
@@ -112,11 +112,11 @@ template <class Real> struct Row {
 };
 
 /** Difference of two coordinates, high parts first: they cancel without an error. */
-template <class D, class Real = hn::TFromD<D>>
+template <bool RESTS, class D, class Real = hn::TFromD<D>>
 HWY_INLINE hn::Vec<D> displacement(D d, Real own, Real ownRest, const Real* HWY_RESTRICT other,
                                    const Real* HWY_RESTRICT otherRest) {
     const auto whole = hn::Sub(hn::Set(d, own), hn::LoadU(d, other));
-    if constexpr (sizeof(Real) == 8)
+    if constexpr (!RESTS)
         return whole;
     else
         return hn::Add(whole, hn::Sub(hn::Set(d, ownRest), hn::LoadU(d, otherRest)));
@@ -132,11 +132,12 @@ template <bool DIAGONAL, Scalars SCALARS, class D, class Law, class V = hn::Vec<
 HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row<Real>& row, int j,
                          V vx, V vy, V vz, V& ux, V& uy, V& uz, V& wx, V& wy, V& wz,
                          Real* HWY_RESTRICT record) {
-    const V dx = displacement(d, row.x, row.restX, p.x + j, p.restX + j),
-            dy = displacement(d, row.y, row.restY, p.y + j, p.restY + j),
-            dz = displacement(d, row.z, row.restZ, p.z + j, p.restZ + j);
+    constexpr bool RESTS = sizeof(Real) == 4 && SCALARS != Scalars::ReplayedNear;
+    const V dx = displacement<RESTS>(d, row.x, row.restX, p.x + j, p.restX + j),
+            dy = displacement<RESTS>(d, row.y, row.restY, p.y + j, p.restY + j),
+            dz = displacement<RESTS>(d, row.z, row.restZ, p.z + j, p.restZ + j);
     V F, C;
-    if constexpr (SCALARS == Scalars::Replayed) {
+    if constexpr (SCALARS == Scalars::Replayed || SCALARS == Scalars::ReplayedNear) {
         F = hn::LoadU(d, record);
         C = hn::LoadU(d, record + hn::Lanes(d));
     } else {
@@ -163,52 +164,88 @@ HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row
     wz = hn::MulAdd(forColumn, dz, hn::MulAdd(F, ownZ, wz));
 }
 
-/** Two rows at once: what is loaded and stored of a column serves both. */
+/**
+ * Rows at once: what is loaded and stored of a column serves all. Four need the registers of 32.
+ */
+constexpr int ROWS = (HWY_TARGET <= HWY_AVX3 || !HWY_ARCH_X86 ? 4 : 2);
+static_assert(ALL_PAIRS_ROWS % ROWS == 0);
+/// Bytes of columns at a time: with the rows they stay in the nearest cache.
+constexpr int TILE_BYTES = 2048;
+
+/** Rows i to i + ROWS - 1 with the columns of [begin, end) beyond them. @return end of the record
+ */
+template <class Law, Scalars SCALARS, class D, class Real = hn::TFromD<D>>
+HWY_INLINE Real* addRowsOfTile(D d, const AllPairs<Real>& p, int i, int begin, int end,
+                               const Real* HWY_RESTRICT v, Real* HWY_RESTRICT sums,
+                               Real* HWY_RESTRICT record) {
+    using V = hn::Vec<D>;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const size_t y = p.stride, z = 2 * size_t(p.stride);
+    const Law law;
+    const Row<Real> row1(p, i, v), row2(p, i + 1, v), row3(p, i + ROWS - 2, v),
+        row4(p, i + ROWS - 1, v);
+    V u1x = hn::Zero(d), u1y = u1x, u1z = u1x, u2x = u1x, u2y = u1x, u2z = u1x, u3x = u1x,
+      u3y = u1x, u3z = u1x, u4x = u1x, u4y = u1x, u4z = u1x;
+    const auto column = [&](auto diagonal, int j) HWY_ATTR {
+        constexpr bool DIAGONAL = decltype(diagonal)::value;
+        const V vx = hn::LoadU(d, v + j), vy = hn::LoadU(d, v + y + j),
+                vz = hn::LoadU(d, v + z + j);
+        V wx = hn::LoadU(d, sums + j), wy = hn::LoadU(d, sums + y + j),
+          wz = hn::LoadU(d, sums + z + j);
+        addPairs<DIAGONAL, SCALARS>(d, law, p, row1, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz,
+                                    record);
+        addPairs<DIAGONAL, SCALARS>(d, law, p, row2, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz,
+                                    record + 2 * lanes);
+        if constexpr (ROWS == 4) {
+            addPairs<DIAGONAL, SCALARS>(d, law, p, row3, j, vx, vy, vz, u3x, u3y, u3z, wx, wy, wz,
+                                        record + 4 * lanes);
+            addPairs<DIAGONAL, SCALARS>(d, law, p, row4, j, vx, vy, vz, u4x, u4y, u4z, wx, wy, wz,
+                                        record + 6 * lanes);
+        }
+        if (SCALARS != Scalars::Evaluated)
+            record += 2 * ROWS * lanes;
+        hn::StoreU(wx, d, sums + j);
+        hn::StoreU(wy, d, sums + y + j);
+        hn::StoreU(wz, d, sums + z + j);
+    };
+    int j = begin;
+    for (; j < end && j < i + ROWS; j += lanes)
+        column(std::true_type(), j);
+    for (; j < end; j += lanes)
+        column(std::false_type(), j);
+    const auto add = [&](int row, V ux, V uy, V uz) HWY_ATTR {
+        sums[row] += hn::GetLane(hn::SumOfLanes(d, ux));
+        sums[y + row] += hn::GetLane(hn::SumOfLanes(d, uy));
+        sums[z + row] += hn::GetLane(hn::SumOfLanes(d, uz));
+    };
+    add(i, u1x, u1y, u1z);
+    add(i + 1, u2x, u2y, u2z);
+    if constexpr (ROWS == 4) {
+        add(i + 2, u3x, u3y, u3z);
+        add(i + 3, u4x, u4y, u4z);
+    }
+    return record;
+}
+
 template <class Law, Scalars SCALARS, class Real>
 void addRowsAny(const AllPairs<Real>& given, int from, int to, const Real* HWY_RESTRICT v,
                 Real* HWY_RESTRICT sums, Real* HWY_RESTRICT record) {
     const hn::CappedTag<Real, ALL_PAIRS_LANES> d;
-    using V = hn::Vec<decltype(d)>;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    const Law law;
+    const int lanes = static_cast<int>(hn::Lanes(d)), tile = TILE_BYTES / sizeof(Real);
     const AllPairs<Real> p = given; // no store below can change it
-    const size_t y = p.stride, z = 2 * size_t(p.stride);
-    for (int i = from; i < to; i += 2) {
-        const Row<Real> first(p, i, v), second(p, i + 1, v);
-        V u1x = hn::Zero(d), u1y = u1x, u1z = u1x, u2x = u1x, u2y = u1x, u2z = u1x;
-        const auto column = [&](auto diagonal, int j) {
-            constexpr bool DIAGONAL = decltype(diagonal)::value;
-            const V vx = hn::LoadU(d, v + j), vy = hn::LoadU(d, v + y + j),
-                    vz = hn::LoadU(d, v + z + j);
-            V wx = hn::LoadU(d, sums + j), wy = hn::LoadU(d, sums + y + j),
-              wz = hn::LoadU(d, sums + z + j);
-            addPairs<DIAGONAL, SCALARS>(d, law, p, first, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz,
-                                        record);
-            addPairs<DIAGONAL, SCALARS>(d, law, p, second, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz,
-                                        record + 2 * lanes);
-            if (SCALARS != Scalars::Evaluated)
-                record += 4 * lanes;
-            hn::StoreU(wx, d, sums + j);
-            hn::StoreU(wy, d, sums + y + j);
-            hn::StoreU(wz, d, sums + z + j);
-        };
-        int j = i / lanes * lanes;
-        for (; j <= i + 1; j += lanes)
-            column(std::true_type(), j);
-        for (; j < p.count; j += lanes)
-            column(std::false_type(), j);
-        sums[i] += hn::GetLane(hn::SumOfLanes(d, u1x));
-        sums[y + i] += hn::GetLane(hn::SumOfLanes(d, u1y));
-        sums[z + i] += hn::GetLane(hn::SumOfLanes(d, u1z));
-        sums[i + 1] += hn::GetLane(hn::SumOfLanes(d, u2x));
-        sums[y + i + 1] += hn::GetLane(hn::SumOfLanes(d, u2y));
-        sums[z + i + 1] += hn::GetLane(hn::SumOfLanes(d, u2z));
+    for (int begin = from / tile * tile; begin < p.count; begin += tile) {
+        const int end = begin + tile < p.count ? begin + tile : p.count;
+        for (int i = from; i < to && i < end; i += ROWS) {
+            const int first = i / lanes * lanes;
+            record = addRowsOfTile<Law, SCALARS>(d, p, i, first > begin ? first : begin, end, v,
+                                                 sums, record);
+        }
     }
 }
 
 template <class Law, class Real> AllPairsKernels<Real> kernelsOf() {
     return {addRowsAny<Law, Scalars::Evaluated, Real>, addRowsAny<Law, Scalars::Recorded, Real>,
-            addRowsAny<Law, Scalars::Replayed, Real>};
+            addRowsAny<Law, Scalars::Replayed, Real>, addRowsAny<Law, Scalars::ReplayedNear, Real>};
 }
 
 template <class Real> AllPairsKernels<Real> kernelsFor(PairLaw law) {

@@ -11,6 +11,8 @@ namespace PSE {
 
 /// Arrays are padded to a multiple of these: no vector of numbers is longer.
 constexpr int ALL_PAIRS_LANES = 16;
+/// Rows are taken by at most so many at once, of which the last may lie in the padding.
+constexpr int ALL_PAIRS_ROWS = 4;
 
 /**
  * Where the particles are, in units of the plan's radius. A coordinate is the sum of two numbers:
@@ -36,14 +38,15 @@ enum class PairLaw {
 };
 
 /**
- * Numbers of a record of rows [from, to), from even: F and C of all their pairs, and more, as the
- * loops run over whole vectors.
+ * Numbers of a record of rows [from, to), from a multiple of ALL_PAIRS_ROWS: F and C of all their
+ * pairs, and more, as the loops run over whole vectors.
  */
 inline size_t recordSize(int count, int from, int to) {
     size_t size = 0;
-    for (int i = from; i < to; i += 2) {
+    for (int i = from; i < to; i += ALL_PAIRS_ROWS) {
         const int begin = i / ALL_PAIRS_LANES * ALL_PAIRS_LANES;
-        size += 4 * size_t((count - begin + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES + 1) *
+        size += 2 * ALL_PAIRS_ROWS *
+                size_t((count - begin + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES + 1) *
                 ALL_PAIRS_LANES;
     }
     return size;
@@ -53,7 +56,7 @@ inline size_t recordSize(int count, int from, int to) {
 template <class Real> struct AllPairsKernels {
     /**
      * Add what pairs (i, j), from <= i < to, i < j, make of v, to both: sums += M v.
-     * from is even, to is even or count.
+     * from and to are multiples of ALL_PAIRS_ROWS, or to is count.
      * @param v       [3][stride], zero from place `count` on
      * @param sums    [3][stride], of which columns from `from` rounded down to ALL_PAIRS_LANES are
      * changed; what is added from place `count` on means nothing
@@ -64,6 +67,8 @@ template <class Real> struct AllPairsKernels {
     AddRows addRows;     ///< keeps nothing
     AddRows recordRows;  ///< the same, and keeps F and C of all pairs
     AddRows addRecorded; ///< the same from that record
+    /// the same, displacements by the first numbers of coordinates alone
+    AddRows addRecordedNear;
 };
 
 /** The loops for the best instruction set of this machine. */

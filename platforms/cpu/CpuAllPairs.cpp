@@ -2,6 +2,7 @@
 #include "CpuAllPairs.h"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 using namespace PSE::numerics;
 
@@ -9,6 +10,8 @@ namespace PSE {
 
 namespace {
 constexpr double MOST_RECORDED = 64e6; ///< bytes: 4000 particles in single precision
+/// Of the Lanczos tolerance: what rounded coordinates may err by [T57].
+constexpr double ROUNDING_SHARE = 0.05;
 
 PairLaw lawOf(const UnboundedPlan& plan) {
     if (plan.model == SphereModel::ForceCoupling)
@@ -26,6 +29,8 @@ template <class Real>
 CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<double>& radii,
                                const Threads& threads, const Threads& oneThread)
     : KrylovVectors<Real>(oneThread), threads(threads), a(plan.a),
+      farthestNear(2 * ROUNDING_SHARE * plan.lanczosTolerance /
+                   std::numeric_limits<Real>::epsilon()),
       count(static_cast<int>(radii.size())),
       padded((count + ALL_PAIRS_LANES - 1) / ALL_PAIRS_LANES * ALL_PAIRS_LANES),
       loops(allPairsKernels<Real>(lawOf(plan))),
@@ -66,10 +71,18 @@ template <class Real> void CpuAllPairs<Real>::divideRows() {
 
 template <class Real> void CpuAllPairs<Real>::setPositions(const std::vector<Vec3>& x) {
     recorded = false;
+    const double infinity = std::numeric_limits<double>::infinity();
+    Vec3 least = Vec3::Constant(infinity), most = -least;
+    for (const Vec3& place : x) {
+        least = least.cwiseMin(place);
+        most = most.cwiseMax(place);
+    }
+    const Vec3 middle = 0.5 * (least + most);
+    isNear = (most - least).maxCoeff() / (2 * a) <= farthestNear;
     threads.runBlocks(count, [&](int from, int to, int) {
         for (int i = from; i < to; i++)
             for (int c = 0; c < 3; c++) {
-                const double reduced = x[i][c] / a;
+                const double reduced = (x[i][c] - middle[c]) / a;
                 places[c][i] = Real(reduced);
                 rests[c][i] = Real(reduced - double(places[c][i]));
             }
@@ -92,7 +105,8 @@ double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w
                                   gaussianC.data(),
                                   static_cast<int>(gaussianF.size())};
     const bool keeps = keepsRecord || recorded;
-    const auto loop = recorded ? loops.addRecorded : keeps ? loops.recordRows : loops.addRows;
+    const auto replay = isNear ? loops.addRecordedNear : loops.addRecorded;
+    const auto loop = recorded ? replay : keeps ? loops.recordRows : loops.addRows;
     threads.run(static_cast<int>(sums.size()), [&](int slab, int) {
         Vector& mine = sums[slab];
         if (keeps && !recorded)

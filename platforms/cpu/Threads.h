@@ -17,7 +17,8 @@ namespace PSE {
 class Threads {
 public:
     /** @param serial  run in the calling thread: waking others costs more than a small scene */
-    Threads(OpenMM::ThreadPool& pool, bool serial) : pool(pool), serial(serial) {}
+    Threads(OpenMM::ThreadPool& pool, bool serial)
+        : pool(pool), serial(serial || pool.getNumThreads() < 2) {}
     int count() const { return serial ? 1 : pool.getNumThreads(); }
 
     /** Call work(task, thread) once for each task in [0, tasks); the first exception is passed on.
