@@ -12,9 +12,9 @@ namespace PSE {
 
 /**
  * The mobility of an unbounded fluid as a sum over all pairs [T32]. The first of several products
- * at the same positions keeps the two scalars of each pair for the others, which take less than half
- * its time [T57]; beyond MOST_RECORDED bytes every product evaluates them anew. Mobilities in units
- * of 1/(6 pi eta a), lengths in a, the plan's radius. Vectors are three arrays, one per
+ * at the same positions keeps the two scalars of each pair for the others, which take less than
+ * half its time [T57]; beyond MOST_RECORDED bytes every product evaluates them anew. Mobilities in
+ * units of 1/(6 pi eta a), lengths in a, the plan's radius. Vectors are three arrays, one per
  * component, of stride() places in the order of the particles; those beyond the last particle hold
  * zeros.
  *
