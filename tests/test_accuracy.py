@@ -376,6 +376,37 @@ def testCommandWritesTablePictureAndNumbers(files, tmp_path, capsys):
     assert len(marked) == sum(row["recommended"] == "1" for row in rows) <= 1
 
 
+def testCommandRecommendsAStep(small, files, tmp_path, capsys):
+    """The words, the number of recommendStep() and that of the table; [T60] is tested in torture/test_order.py."""
+    arguments = [*files, "--output", str(tmp_path), *SMALL, "--tolerances", "1e-1", "--bias"]
+    assert accuracy.main([*arguments, "0.02"]) == 0
+    printed = capsys.readouterr().out
+    advice = accuracy.recommendStep(command.load(command._parser().parse_args(files)), bias=0.02)
+    assert f"relaxes at {advice.rate:.3g} /ps, so steps must stay below {advice.stable:.3g} ps" in printed
+    assert f"at 1 ps its variance is off by {advice.bias:.2g}" in printed
+    assert f"Recommended time step: {advice.recommended:.2g} ps, for a bias of 0.02" in printed
+    with open(tmp_path/"accuracy.csv") as file:
+        assert float(next(csv.DictReader(file))["recommended_step_ps"]) == pytest.approx(advice.recommended, rel=1e-5)
+    assert accuracy.main([*arguments, "0.02", "--step", str(1.5*advice.stable)]) == 0
+    assert "its variance grows without bound" in capsys.readouterr().out
+
+
+def testForcesOnVirtualSites():
+    """A spring on the mean of two spheres: k/4 on each and between them, for M a rate of (mu + mu') k/2."""
+    a, k, far = 0.5, 500.0, 5.0
+    system = scenes.makeSystem(scenes.Scene(np.zeros((3, 3)), scenes.cube(20.0), a), masses=[1.0, 1.0, 0.0])
+    system.setVirtualSite(2, openmm.TwoParticleAverageSite(0, 1, 0.5, 0.5))
+    spring = openmm.CustomExternalForce(f"{k/2}*x^2")
+    spring.addParticle(2, [])
+    system.addForce(spring)
+    integrator = template(radius=a)
+    integrator.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
+    scene = Scene(system, [[0, 0, 0], [0, 0, far], [0, 0, far/2]], integrator)
+    r = far/a
+    expected = k/2*scene.freeMobility*(1 + 3/(4*r) + 1/(2*r**3))
+    assert accuracy.recommendStep(scene, configurations=1).rate == pytest.approx(expected, rel=2e-3)
+
+
 def testCommandOnSplitsThatAreNone(small, tmp_path, capsys):
     """An unbounded fluid, and force coupling by waves alone: no splitting parameter, which tuning leaves out."""
     def unbounded(integrator):
@@ -486,6 +517,7 @@ def testInterruptedBeforeAnything(files, tmp_path, capsys, monkeypatch):
     (lambda f: [*f, "--run-length", "0"], ["runLength is 0", "positive"]),
     (lambda f: [*f, "--correlation-time", "-1"], ["correlationTime is -1", "positive"]),
     (lambda f: [*f, "--rounds", "0"], ["rounds is 0"]),
+    (lambda f: [*f, "--bias", "0"], ["bias is 0", "positive"]),
     (lambda f: [*f, "--radius", "-1"], ["radius is -1", "positive"]),
     (lambda f: [*f, "--tune", "--tolerances", "1e-3", "1e-4"], ["one tolerance", "2 were given"]),
     (lambda f: [*f, "--tune", "--split", "both"], ["one split"]),

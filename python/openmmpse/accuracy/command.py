@@ -14,6 +14,7 @@ from openmmpse import PSEBrownianIntegrator
 from . import figure, report
 from .scene import Scene, SceneError
 from .sweep import ROUNDS, TOLERANCES, Sweep
+from .timestep import BIAS
 from .tuning import tune
 
 SETTINGS = ("temperature", "viscosity", "radius", "step")
@@ -52,6 +53,8 @@ def _parser():
                         help="steps of the run that is planned (default: %(default)s)")  # fmt: skip
     parser.add_argument("--correlation-time", type=float, metavar="PS",
                         help="displacements count as independent after it (default: a^2/D0)")  # fmt: skip
+    parser.add_argument("--bias", type=float, default=BIAS,
+                        help="relative error of the stiffest mode that a step is recommended for (default: %(default)s)")  # fmt: skip
     parser.add_argument("--tolerances", type=float, nargs="+", metavar="TOL",
                         help="default: 1e-1 to 1e-8; with --tune one, default 1e-3")  # fmt: skip
     parser.add_argument("--split", choices=("automatic", "Hasimoto", "Prolate", "AllWaves", "both"), default="automatic")
@@ -150,7 +153,7 @@ class _Bar:
 
 def _sweep(scene, options, bar):
     sweep = Sweep(scene, options.run_length, options.tolerances or TOLERANCES, options.split, options.correlation_time,
-                  options.budget, options.rounds, bar)  # fmt: skip
+                  options.budget, options.rounds, bar, options.bias)  # fmt: skip
     options.output.mkdir(parents=True, exist_ok=True)
     status = 0
     try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import csv
 
+import numpy as np
+
 from .results import KINDS
 
 PARAMETERS = ("xi", "realCutoff", "gridDimensions", "windowSupport", "lanczosIterations", "precision")
@@ -70,9 +72,23 @@ def conclusions(result):
         lines.append(f"Estimated so: {limits.assumptions}.")
         for split in result.splits:
             lines.append(f"Recommended tolerance, {split} split: {result.recommendation(split).reason}.")
+    if result.step is not None:
+        lines += stepText(result.step)
     lines += [f"Note: {note}" for note in result.notes]
     if not result.complete:
         lines.append("INTERRUPTED: what is missing was not measured, and times come from fewer rounds.")
+    return lines
+
+
+def stepText(advice):
+    """Lines of a `StepAdvice`: what the step of the integrator does, and which one is recommended."""
+    lines = []
+    if advice.rate is not None:
+        does = f"is off by {advice.bias:.2g} of itself" if advice.bias < np.inf else "grows without bound"
+        lines.append(f"Time step: the stiffest mode relaxes at {advice.rate:.3g} /ps, so steps must stay below "
+                     f"{advice.stable:.3g} ps; at {advice.present:g} ps its variance {does}.")  # fmt: skip
+    if advice.recommended is not None:
+        lines.append(f"Recommended time step: {advice.recommended:.2g} ps, for {advice.reason}.")
     return lines
 
 
@@ -86,7 +102,7 @@ def writeCsv(result, path):
             *(f"error_{kind}_relative_to_Mf" for kind in KINDS),
             "lanczos_error", "noise_error", "best_s_per_step", "median_s_per_step", "best_s_per_step_without_forces",
             "median_s_per_step_without_forces", "particle_steps_per_s", *PARAMETERS, "recommended", "time_step_error",
-            "statistical_error", "reference_tolerance", *(f"share: {name}" for name in stages),
+            "statistical_error", "recommended_step_ps", "reference_tolerance", *(f"share: {name}" for name in stages),
         ])  # fmt: skip
         for row in result.rows:
             chosen, limits = result.recommendation(row.split), result.limits
@@ -97,7 +113,7 @@ def writeCsv(result, path):
                 _full(result.count / row.seconds if row.seconds else None),
                 *(_cell(row.parameters[k]) for k in PARAMETERS),
                 int(bool(chosen and chosen.tolerance == row.tolerance)), _full(limits and limits.timeStep),
-                _full(limits and limits.statistical), f"{result.referenceTolerance:.0e}",
+                _full(limits and limits.statistical), _full(result.step and result.step.recommended), f"{result.referenceTolerance:.0e}",
                 *(row.stages.get(name, "") for name in stages),
             ])  # fmt: skip
 

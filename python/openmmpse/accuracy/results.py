@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .limits import Limits, Recommendation, recommend
+from .timestep import StepAdvice
 
 KINDS = ("random", "uniform", "scene")  #: of forces: unit normals, all alike, those of the System
 
@@ -50,6 +51,7 @@ class Result:
     runLength: int  #: steps
     referenceTolerance: float | None = None
     limits: Limits | None = None
+    step: StepAdvice | None = None
     rows: list = field(default_factory=list)
     notes: list = field(default_factory=list)  #: what was left out and why, assumptions
     complete: bool = False

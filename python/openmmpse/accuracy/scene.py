@@ -45,6 +45,7 @@ class Scene:
         self.box = _box(system.getDefaultPeriodicBoxVectors() if box is None else box)
         self.positions = _positions(positions, system.getNumParticles())
         self.mobile = np.array([system.getParticleMass(i)._value > 0 for i in range(system.getNumParticles())])
+        self.hasVirtualSites = any(system.isVirtualSite(i) for i in range(system.getNumParticles()))
         self.system, self.timingGroup = _prepared(system, self.box, self.mobile)
         self.platform, self.properties = _platform(platform), dict(properties or {})
         choosable = openmm.Platform.getPlatform(self.platform).getPropertyNames()
@@ -152,13 +153,34 @@ class Probe:
         return self.integrator.getNumericalParameters()
 
     def place(self, positions):
-        """Set positions (N, 3) in nm, in the box of the scene."""
+        """Set positions (N, 3) in nm, in the box of the scene; virtual sites go where they belong."""
         self.context.setPeriodicBoxVectors(*(openmm.Vec3(*row) for row in self.scene.box))
         self.context.setPositions(positions)
+        if self.scene.hasVirtualSites:
+            self.context.computeVirtualSites()
 
     def velocities(self, forces):
         """M f of the particles that move, (count, 3) in nm/ps, for forces (N, 3) in kJ/(mol nm)."""
         return self.integrator.applyMobility(forces)[self.scene.mobile]
+
+    def velocitiesAt(self, positions, forces):
+        """M f at positions (N, 3) in nm of the particles that move, for forces (count, 3) on them."""
+        self.place(positions)
+        everybody = np.zeros_like(self.scene.positions)
+        everybody[self.scene.mobile] = forces
+        return self.velocities(everybody)
+
+    def forcesAt(self, positions):
+        """Forces of the System at positions (N, 3) in nm on the particles that move, (count, 3) in kJ/(mol nm)."""
+        self.place(positions)
+        return self.forces()[self.scene.mobile]
+
+    def run(self, positions, stepSize, steps):
+        """Positions (N, 3) in nm after so many steps of stepSize (ps) from positions."""
+        self.place(positions)
+        self.integrator.setStepSize(stepSize)
+        self.integrator.step(steps)
+        return np.array(self.context.getState(positions=True).getPositions(asNumpy=True)._value)
 
     def displacements(self, count):
         """Brownian displacements of the particles that move, (count, n, 3) in nm."""
@@ -202,6 +224,24 @@ class Probe:
         start = time.perf_counter()
         self.integrator.step(steps)
         return (time.perf_counter() - start) / steps
+
+
+def sceneOf(source, positions=None, integrator=None, box=None, platform=None, properties=None):
+    """A `Scene` from what `measure` and `tune` accept."""
+    if isinstance(source, Scene):
+        return source
+    if isinstance(source, openmm.Context):
+        return Scene.ofContext(source, platform, properties)
+    if positions is None or integrator is None:
+        raise TypeError(f"measuring a {type(source).__name__} needs positions and integrator; a Context needs neither")
+    return Scene(source, positions, integrator, box, platform or "CPU", properties)
+
+
+def checkNumbers(**numbers):
+    """Raise ValueError for a number that is given and not positive and finite."""
+    for name, value in numbers.items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} is {value}; it must be positive and finite")
 
 
 def _positions(positions, expected):

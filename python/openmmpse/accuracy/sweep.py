@@ -8,9 +8,9 @@ import time
 import numpy as np
 import openmm
 
-from . import limits, stages
+from . import limits, stages, timestep
 from .results import KINDS, Result, Row
-from .scene import Scene, SceneError
+from .scene import SceneError, checkNumbers, sceneOf
 
 TOLERANCES = tuple(10.0**-digits for digits in range(1, 9))
 TIGHTEST = 1e-10  #: that the library serves
@@ -24,7 +24,7 @@ DOUBLE_PRICE = 2.0
 
 def measure(source, positions=None, integrator=None, *, box=None, platform=None, properties=None, runLength=1_000_000,
             tolerances=TOLERANCES, split="automatic", correlationTime=None, budget=120.0, rounds=ROUNDS,
-            progress=None):  # fmt: skip
+            progress=None, bias=timestep.BIAS):  # fmt: skip
     """Measure what accuracy costs for a scene; returns a `Result`.
 
     source           openmm.Context with a PSEBrownianIntegrator, `Scene`, or openmm.System (then with positions and
@@ -38,22 +38,12 @@ def measure(source, positions=None, integrator=None, *, box=None, platform=None,
                      reference, and tolerances less than ten times looser than that are left out
     rounds           timed turns of each tolerance
     progress         called with (text, share of the work done)
+    bias             relative error of the stiffest mode's variance that a time step is recommended for
 
     Raises SceneError for what cannot be measured, openmm.OpenMMException for what the library refuses.
     """
     scene = sceneOf(source, positions, integrator, box, platform, properties)
-    return Sweep(scene, runLength, tolerances, split, correlationTime, budget, rounds, progress).run()
-
-
-def sceneOf(source, positions=None, integrator=None, box=None, platform=None, properties=None):
-    """A `Scene` from what `measure` and `tune` accept."""
-    if isinstance(source, Scene):
-        return source
-    if isinstance(source, openmm.Context):
-        return Scene.ofContext(source, platform, properties)
-    if positions is None or integrator is None:
-        raise TypeError(f"measuring a {type(source).__name__} needs positions and integrator; a Context needs neither")
-    return Scene(source, positions, integrator, box, platform or "CPU", properties)
+    return Sweep(scene, runLength, tolerances, split, correlationTime, budget, rounds, progress, bias).run()
 
 
 def forceKinds(scene, actual):
@@ -72,12 +62,12 @@ class Sweep:
     """A measurement in progress: `result` holds what is known so far, also after an interruption of run()."""
 
     def __init__(self, scene, runLength=1_000_000, tolerances=TOLERANCES, split="automatic", correlationTime=None,
-                 budget=120.0, rounds=ROUNDS, progress=None):  # fmt: skip
-        checkNumbers(runLength=runLength, correlationTime=correlationTime, budget=budget, rounds=rounds)
+                 budget=120.0, rounds=ROUNDS, progress=None, bias=timestep.BIAS):  # fmt: skip
+        checkNumbers(runLength=runLength, correlationTime=correlationTime, budget=budget, rounds=rounds, bias=bias)
         self.scene, self.runLength, self.correlationTime = scene, int(runLength), correlationTime
         self.tolerances = checkedTolerances(tolerances)
         self.splits = ("Hasimoto", "Prolate") if split == "both" else (split,)
-        self.budget, self.rounds, self.progress = budget, int(rounds), progress
+        self.budget, self.rounds, self.progress, self.bias = budget, int(rounds), progress, bias
         self.result = Result(scene.count, scene.platform, self.runLength)
         self._probes = []
 
@@ -90,6 +80,7 @@ class Sweep:
         self._reference()
         self._advance("other errors of the run")
         self.result.limits = limits.estimate(self.scene, self.runLength, self.correlationTime)
+        self._adviseStep()
         self._advance("other errors of the run")
         for split in self.splits:
             self._sweep(split)
@@ -107,6 +98,12 @@ class Sweep:
         self._done += parts
         if self.progress:
             self.progress(text, min(1.0, self._done / self._total))
+
+    def _adviseStep(self):
+        try:
+            self.result.step = timestep.advise(self.scene, self.bias)
+        except (openmm.OpenMMException, SceneError) as error:
+            self._note(f"no time step recommended, because a short run failed: {error}")
 
     # ---- the tight run ----
 
@@ -246,10 +243,3 @@ def checkedTolerances(tolerances):
     if not values:
         raise ValueError("no tolerances given; give at least one between 1e-9 and 0.1")
     return values
-
-
-def checkNumbers(**numbers):
-    """Raise ValueError for a number that is given and not positive and finite."""
-    for name, value in numbers.items():
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value}; it must be positive and finite")

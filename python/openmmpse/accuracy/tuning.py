@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import openmm
 
-from .sweep import ROUND_SECONDS, ROUNDS, checkedTolerances, checkNumbers, sceneOf
+from .scene import checkNumbers, sceneOf
+from .sweep import ROUND_SECONDS, ROUNDS, checkedTolerances
 
 FACTORS = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)  #: of the automatic splitting parameter
 SUPPORTS = (-1, 1)  #: added to the automatic support of the window
