@@ -46,11 +46,15 @@ EngineScene makeScene(const std::string& name, const Lattice& box, int n, double
     return scene;
 }
 
-std::vector<EngineScene> scenes() {
+Lattice tiltedBox() {
     const auto column = [](int d) {
         return Vec3(TILTED_BOX[d][0], TILTED_BOX[d][1], TILTED_BOX[d][2]);
     };
-    const Lattice tilted(column(0), column(1), column(2));
+    return Lattice(column(0), column(1), column(2));
+}
+
+std::vector<EngineScene> scenes() {
+    const Lattice tilted = tiltedBox();
     std::vector<EngineScene> all;
     for (double tolerance : {1e-3, 1e-6}) {
         all.push_back(makeScene("cube", Lattice::orthorhombic(24, 24, 24), 200, tolerance));
@@ -183,6 +187,24 @@ TEST(CpuEngine, RealHalfIsItsDefinitionOnEveryInstructionSet) {
             EXPECT_LT(realSpaceError<float>(scene, exact), 2e-6);
         }
     }
+}
+
+TEST(CpuEngine, NearestFractionsAreEnoughUpToHalfTheWidthOfATiltedBox) {
+    int within = 0, beyond = 0;
+    for (double scale : {0.5, 0.55, 0.6, 0.65, 0.7, 0.8, 0.9, 1.1}) {
+        const EngineScene scene = makeScene("tilted box", tiltedBox().scaled(scale), 60, 1e-2);
+        if (scene.plan.sumImages)
+            continue;
+        double reach = 0; // of the range, in fractions of the box
+        for (int d = 0; d < 3; d++)
+            reach = std::max(reach, scene.plan.realCutoff / scene.box.width(d));
+        (reach > 0.5 ? beyond : within)++;
+        const std::vector<Vec3> exact = realVelocities(scene);
+        EXPECT_LT(realSpaceError<double>(scene, exact), 1e-12) << "reach " << reach;
+        EXPECT_LT(realSpaceError<float>(scene, exact), 2e-6) << "reach " << reach;
+    }
+    EXPECT_GT(within, 0);
+    EXPECT_GT(beyond, 0);
 }
 
 TEST(CpuEngine, DistancesWhoseSquaresUnderflowStayFinite) {

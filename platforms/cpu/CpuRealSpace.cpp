@@ -290,6 +290,9 @@ template <class Real> PairPolynomials<Real> CpuRealSpace<Real>::polynomials() co
 
 template <class Real> PairGeometry<Real> CpuRealSpace<Real>::geometry() const {
     const Matrix3 v = box.vectors() / a;
+    // Fractions of a displacement within the range are below its reach: the nearest ones are its
+    // own where that is at most half a box vector, whatever the tilt.
+    const bool reachesFar = *std::max_element(reach, reach + 3) > 0.5;
     const auto unit = [](double length) { return Real(length * PairCoordinate<Real>::UNIT); };
     return {
         axes[0].data(),
@@ -297,7 +300,7 @@ template <class Real> PairGeometry<Real> CpuRealSpace<Real>::geometry() const {
         axes[2].data(),
         {unit(v(0, 0)), unit(v(0, 1)), unit(v(1, 1)), unit(v(0, 2)), unit(v(1, 2)), unit(v(2, 2))},
         {Real(v(0, 0)), Real(v(0, 1)), Real(v(1, 1))},
-        tilted,
+        tilted && reachesFar,
         Real(range / a)};
 }
 

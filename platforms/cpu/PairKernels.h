@@ -66,9 +66,9 @@ template <class Real> struct PairGeometry {
     const typename PairCoordinate<Real>::Type *x, *y, *z;
     /// ax, bx, by, cx, cy, cz in radii per unit of PairCoordinate
     Real box[6];
-    Real whole[3]; ///< ax, bx, by in radii
-    bool tilted;   ///< bx, cx or cy is not zero
-    Real range;    ///< in radii, below half the smallest of ax, by, cz
+    Real whole[3];  ///< ax, bx, by in radii
+    bool ambiguous; ///< the nearest fractions of a pair in range may be those of another image
+    Real range;     ///< in radii, below half the smallest of ax, by, cz
 };
 
 /** Particles [begin, end) may be neighbours. */

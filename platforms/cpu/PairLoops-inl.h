@@ -40,7 +40,7 @@ public:
                         hn::MulAdd(constant(g.box[1]), sy, hn::Mul(constant(g.box[3]), sz)));
         dy = hn::MulAdd(constant(g.box[2]), sy, hn::Mul(constant(g.box[4]), sz));
         dz = hn::Mul(constant(g.box[5]), sz);
-        if (g.tilted) { // the nearest fractions are not always the nearest image there
+        if (g.ambiguous) { // the nearest fractions are not always the nearest image there
             const V nb = hn::Round(hn::Mul(dy, constant(1 / g.whole[2])));
             dy = hn::NegMulAdd(nb, constant(g.whole[2]), dy);
             dx = hn::NegMulAdd(nb, constant(g.whole[1]), dx);
