@@ -15,7 +15,8 @@ import scenes
 from openmmpse import PSEBrownianIntegrator
 from platformnames import isDevice, isDirect
 from polymers import NAMES, Melt, assertAgree, blocked, combined, deviation
-from scenes import FALSE_ALARM, makeContext, positionsOf
+from scenes import FALSE_ALARM, KB, makeContext, positionsOf
+from test_contact import RADIUS, nearlyHard
 
 SMALL, LARGE = Melt(chains=4, beads=5), Melt(chains=20, beads=10)
 PRODUCT = 0.05 # of stiffness of a bond, mobility of a bead and the smaller time step
@@ -86,6 +87,47 @@ def assertPressure(melt, context, integrator):
     ideal = melt.count*melt.kT/melt.edge**3
     pressure = -np.trace(integrator.computeStress()._value)/3/ideal
     assert abs(pressure - melt.observed(positionsOf(context)[None])["pressure"][0]) < 1e-3
+
+
+@pytest.mark.onePlatform
+def testPressureOfNearlyHardSpheres(hardCase):
+    """
+    60 nearly hard spheres (36th power, 20 kT at 1.9 a) at a volume fraction of 0.2 on CPU, 3e5 steps of
+    1e-4 a^2/D (short form: 1e4).
+
+    The osmotic pressure beyond the ideal one is that of Carnahan and Starling for spheres of the diameter
+    of Barker and Henderson, to 3 % (for that mapping and for the time step) and error bars (false alarm
+    1e-6).
+    """
+    steepness, reach, kT = 36, 2.4, KB*300.0
+    r = np.linspace(1e-3, reach, 100_001)
+    energy = 20*((1.9/r)**steepness - (1.9/reach)**steepness)
+    diameter = np.trapezoid(1 - np.exp(-np.minimum(energy, 700)), r)
+    phi = 0.2*(diameter/2)**3
+    beyond = (1 + phi + phi**2 - phi**3)/(1 - phi)**3 - 1
+    dilute, N = scenes.randomSuspension(60, 0.16, scenes.cube(1), RADIUS, 755), 60
+    shrunk = (0.16/0.2)**(1/3)
+    scene = scenes.Scene(dilute.positions*shrunk, dilute.box*shrunk, RADIUS)
+    tick = RADIUS**2/(kT*scene.mu0)
+    context, integrator = makeContext(scene, "CPU", 300.0, 5e-6*tick, TOLERANCE, forces=[nearlyHard(scene)])
+    integrator.step(500)
+    integrator.setStepSize(1e-4*tick)
+    steps = 300_000 if hardCase.long else 10_000
+    integrator.step(steps//10)
+    virials, edge = [], scene.box[0, 0]/RADIUS
+    first, second = np.triu_indices(N, 1)
+    for _ in range(steps//10):
+        integrator.step(10)
+        x = positionsOf(context)/RADIUS
+        between = x[first] - x[second]
+        between -= edge*np.rint(between/edge)
+        distances = np.linalg.norm(between, axis=1)
+        near = distances[distances < reach]
+        virials.append(np.sum(steepness*20*(1.9/near)**steepness)/(3*N))
+    mean, variance, degrees = blocked(virials, 32 if hardCase.long else 16)
+    hardCase.measure(**{"measured": float(mean), "Carnahan-Starling": float(beyond), "sigma": float(np.sqrt(variance))})
+    away = (max(0.0, abs(mean - beyond) - 0.03*beyond), variance, degrees)
+    assert deviation(away) < scenes.stats.norm.isf(FALSE_ALARM/2)
 
 
 def testMonteCarloOfIdealChains():
