@@ -102,7 +102,7 @@ def testPressureOfNearlyHardSpheres(hardCase):
     steepness, reach, kT = 36, 2.4, KB*300.0
     r = np.linspace(1e-3, reach, 100_001)
     energy = 20*((1.9/r)**steepness - (1.9/reach)**steepness)
-    diameter = np.trapezoid(1 - np.exp(-np.minimum(energy, 700)), r)
+    diameter = reach*np.mean(1 - np.exp(-np.minimum(energy, 700)))
     phi = 0.2*(diameter/2)**3
     beyond = (1 + phi + phi**2 - phi**3)/(1 - phi)**3 - 1
     dilute, N = scenes.randomSuspension(60, 0.16, scenes.cube(1), RADIUS, 755), 60
