@@ -391,6 +391,15 @@ def testCommandRecommendsAStep(small, files, tmp_path, capsys):
     assert "its variance grows without bound" in capsys.readouterr().out
 
 
+def testNoStepWhereAShortRunFails(small, monkeypatch):
+    def failing(*_):
+        raise openmm.OpenMMException("blown up")
+
+    monkeypatch.setattr(accuracy.timestep, "advise", failing)
+    result = accuracy.measure(sceneOf(small), rounds=1, tolerances=(1e-1,))
+    assert result.complete and result.step is None and any("blown up" in note for note in result.notes)
+
+
 def testForcesOnVirtualSites():
     """A spring on the mean of two spheres: k/4 on each and between them, for M a rate of (mu + mu') k/2."""
     a, k, far = 0.5, 500.0, 5.0

@@ -360,6 +360,16 @@ def testLargestStableStep(platformName, hardCase):
 
 
 @pytest.mark.onePlatform
+def testAStepInABoxThatMoves():
+    """Where the short run would shear the box, the given positions alone count."""
+    scene = scenes.randomSuspension(20, 0.1, scenes.cube(1), RADIUS, 784)
+    bonds = scenes.harmonicBonds([(i, i + 1) for i in range(19)], 2.4*RADIUS, 100.0)
+    context, _ = makeContext(scene, "CPU", TEMPERATURE, 1.0, forces=[bonds], configure=lambda i: i.setShearRate(1e-3))
+    one, four = (accuracy.recommendStep(context, configurations=n) for n in (1, 4))
+    assert one == four and one.rate > 0
+
+
+@pytest.mark.onePlatform
 def testNothingLimitsTheStep():
     """Without forces, the rms displacement of 0.3 radii; without noise either, nothing."""
     pair = scenes.pair(3.0, 20.0, RADIUS)

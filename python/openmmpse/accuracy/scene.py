@@ -176,11 +176,13 @@ class Probe:
         return self.forces()[self.scene.mobile]
 
     def run(self, positions, stepSize, steps):
-        """Positions (N, 3) in nm after so many steps of stepSize (ps) from positions."""
+        """Positions (N, 3) in nm after so many steps of stepSize (ps) from positions; None if the box has changed."""
         self.place(positions)
         self.integrator.setStepSize(stepSize)
         self.integrator.step(steps)
-        return np.array(self.context.getState(positions=True).getPositions(asNumpy=True)._value)
+        state = self.context.getState(positions=True)
+        same = np.allclose(_box(state.getPeriodicBoxVectors()), self.scene.box, rtol=1e-6, atol=0)
+        return np.array(state.getPositions(asNumpy=True)._value) if same else None
 
     def displacements(self, count):
         """Brownian displacements of the particles that move, (count, n, 3) in nm."""

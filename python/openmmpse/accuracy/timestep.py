@@ -46,7 +46,7 @@ def recommendStep(source, positions=None, integrator=None, *, box=None, platform
     radii of gyration are; 2/w is the limit of stability. w is the largest eigenvalue of M K, M the mobility and K the
     derivatives of the forces, by Lanczos's method with K in central differences. Of `configurations` along a short run
     (which begins at the positions given, with steps as found so far) the largest counts, because curvature varies where
-    forces are steep. Relax the scene first: an overlap that equilibrium does not have makes the steps short.
+    forces are steep; where the box moves, only the first. Relax the scene first: an overlap that equilibrium does not have makes the steps short.
 
     Where no forces limit it, or softer ones than the fluid, the step is that of an rms displacement of 0.3 radii, in
     which the mobility changes.
@@ -69,6 +69,8 @@ def advise(scene, bias=BIAS, configurations=CONFIGURATIONS):
         rate = max(rate, stiffestRate(probe, positions))
         if number < configurations - 1:
             positions = probe.run(positions, _step(scene, rate, bias)[0] or scene.stepSize, _stretch(scene))
+            if positions is None:  # they belong to another box than the scene
+                break
     present = scene.stepSize
     if rate == 0:
         step, reason = _step(scene, rate, bias)
