@@ -35,7 +35,7 @@ constexpr double SINGLE_SHARE = 0.1;
 /// of the tolerance, for what the window makes of rounding in single precision
 constexpr double ROUNDING_SHARE = 0.2;
 /// of windows by the rules, which the table's share of the budget covers
-constexpr double USUAL_MAGNIFICATION = 8;
+constexpr double USUAL_MAGNIFICATION = 8, LEAST_RADIAL_MAGNIFICATION = 2;
 constexpr double SMALLEST_WINDOW_ERROR = 1e-12;
 constexpr double SINGLE_ROUNDING = 3e-7, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
@@ -178,13 +178,15 @@ void PlanFamily::predict(Plan& plan, double wave) const {
     if ((finer && !request.singleOnly) ||
         magnified.of(SINGLE_ROUNDING) > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
-    const double usual =
-        std::max(1.0, magnified.of(plan.tableError) / plan.tableError / USUAL_MAGNIFICATION);
+    // Fewer terms of a radial window are worth some error.
+    const double least = (plan.mixture ? LEAST_RADIAL_MAGNIFICATION : USUAL_MAGNIFICATION),
+                 usual = std::max(least, magnified.of(plan.tableError) / plan.tableError) /
+                         USUAL_MAGNIFICATION;
     plan.windowError = std::max(SMALLEST_WINDOW_ERROR, plan.tableError / usual);
     const double rounding =
         (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);
     plan.predictedError = std::hypot(plan.predictedError,
-                                     magnified.of(rounding + (usual > 1 ? plan.windowError : 0)));
+                                     magnified.of(rounding + (usual != 1 ? plan.windowError : 0)));
 }
 
 double PlanFamily::shapeOf(int support) const {

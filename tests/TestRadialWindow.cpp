@@ -4,6 +4,7 @@
 #include "numerics/GridMetric.h"
 #include "numerics/RadialWindow.h"
 #include "numerics/Vec3.h"
+#include "numerics/WindowRows.h"
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -176,6 +177,43 @@ TEST(RadialWindow, KernelsArePolynomialsOfTheErrorAskedFor) {
             EXPECT_LT(rough.polynomial.degree(), kernel.polynomial.degree());
         }
     }
+}
+
+/** By a rule of its own over the cylinder of rows, in [0, 1]: error over the average itself. */
+double errorOfRows(const RadialWindow& window, double a, const WindowRows& rows) {
+    constexpr int POINTS = 150;
+    const double step = window.reach(a) / POINTS;
+    double squares = 0, missed = 0;
+    for (int i = 0; i < POINTS; i++)
+        for (int j = 0; j < POINTS; j++) {
+            const double d = (i + 0.5) * step, z = (j + 0.5) * step,
+                         exact = window(std::sqrt(d * d + z * z), a);
+            squares += d * exact * exact;
+            missed += d * std::pow(rows(d, z) - exact, 2);
+        }
+    return std::sqrt(missed / squares);
+}
+
+TEST(WindowRows, AreSumsOfAFewProductsOfTheErrorAskedFor) {
+    const double shapes[][3] = {{4, 8.2, 5e-4}, {5, 10.25, 1e-4}, {6, 12.3, 5e-5}};
+    for (const auto& s : shapes) {
+        const RadialWindow window(s[0], s[1], SPACING);
+        for (double radius : {0.3, 0.7, 1.0}) {
+            SCOPED_TRACE(std::to_string(s[0]) + " " + std::to_string(radius));
+            const double a = radius * SPACING;
+            const WindowRows rows = windowRows(window, a, s[2]),
+                             rough = windowRows(window, a, 30 * s[2]);
+            ASSERT_GE(rows.terms(), 3);
+            EXPECT_LE(rows.terms(), WindowRows::MOST_TERMS);
+            EXPECT_LT(errorOfRows(window, a, rows), 1.05 * s[2]);
+            EXPECT_LT(errorOfRows(window, a, rough), 1.05 * 30 * s[2]);
+            // a lower degree or fewer terms would not do
+            EXPECT_LT(rough.terms() + rough.degree(), rows.terms() + rows.degree() - 1);
+            EXPECT_GT(errorOfRows(window, a, rough), 1.05 * s[2]);
+        }
+    }
+    // the edge of a narrow window has a slope that a few products do not describe
+    EXPECT_EQ(windowRows(RadialWindow(4, 8.2, SPACING), SPACING, 1e-5).terms(), 0);
 }
 
 TEST(RadialWindow, SpacingIsTheLargestAlongTheBoxVectors) {

@@ -2,6 +2,7 @@
 #include "CpuSphereSpread.h"
 #include "numerics/GridMetric.h"
 #include "numerics/RadialWindow.h"
+#include "numerics/WindowRows.h"
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +10,14 @@ using namespace PSE::numerics;
 
 namespace PSE {
 
+static_assert(MOST_ROW_TERMS == WindowRows::MOST_TERMS, "every expansion has its loop");
+
 namespace {
+
+/// distinct radii up to which rows are expanded: each takes milliseconds
+constexpr size_t MOST_ROW_SHAPES = 32;
+/// what is expanded: with less error, rows take more terms than are worth it
+constexpr double SMALLEST_ROW_ERROR = 1e-6;
 
 RadialWindow windowOf(const Plan& plan) {
     return RadialWindow(plan.windowSupport, plan.windowShape, plan.windowSpacing);
@@ -32,7 +40,7 @@ template <class Real> int CpuSphereSpread<Real>::paddingOf(const Plan& plan, con
 template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan& plan) {
     const double shapes = double(plan.mixture->radii().size()) /
                           std::max<size_t>(1, plan.mixture->particleRadii().size());
-    return 6 * sizeof(Real) + 7 * sizeof(int) +
+    return (6 + MOST_ROW_TERMS * SPHERE_LANES) * sizeof(Real) + 7 * sizeof(int) +
            shapes * (sizeof(SphereShape<Real>) + sizeof(double) +
                      (RadialWindow::MAX_DEGREE + 1) * sizeof(Real));
 }
@@ -45,6 +53,7 @@ CpuSphereSpread<Real>::CpuSphereSpread(const Plan& plan, const Lattice& box, con
         shapeOf.push_back(
             static_cast<int>(std::lower_bound(radii.begin(), radii.end(), radius) - radii.begin()));
     makeShapes(plan, threads);
+    makeRows(plan, threads);
     setBox(box);
 }
 
@@ -63,6 +72,9 @@ template <class Real> void CpuSphereSpread<Real>::setBox(const Lattice& box) {
         for (int d = 0; d < 3; d++)
             shapes[i].extent[d] = extentOf(reach[i] * pointsPerLength[d]);
         widest = std::max(widest, shapes[i].extent[0]);
+        const bool fits = std::max(shapes[i].extent[1], shapes[i].extent[2]) <= SPHERE_LANES,
+                   tilted = skewY != 0 || skewX != 0 || skewZ != 0;
+        shapes[i].rowScale = (fits && !tilted ? rowScale[i] : Real(0));
     }
 }
 
@@ -82,7 +94,7 @@ void CpuSphereSpread<Real>::makeShapes(const Plan& plan, const Threads& threads)
         const SphereKernel& kernel = kernels[i];
         // Without a hollow, rounding must not lose the centre itself, t = -1.
         const Real least = kernel.inner > 0 ? Real(-1) : Real(-2);
-        SphereShape<Real> shape = {Real(kernel.scale), Real(kernel.shift), least, {}};
+        SphereShape<Real> shape = {Real(kernel.scale), Real(kernel.shift), least, {}, Real(0)};
         reach.push_back(kernel.reach);
         shapes.push_back(shape);
         const std::vector<double>& powers = kernel.polynomial.powers;
@@ -91,10 +103,43 @@ void CpuSphereSpread<Real>::makeShapes(const Plan& plan, const Threads& threads)
     }
 }
 
+/** Rows of the radii that a few products serve. */
+template <class Real>
+void CpuSphereSpread<Real>::makeRows(const Plan& plan, const Threads& threads) {
+    const std::vector<double>& radii = plan.mixture->radii();
+    const size_t n = radii.size();
+    rowScale.assign(n, Real(0));
+    if (n > MOST_ROW_SHAPES || plan.windowError < SMALLEST_ROW_ERROR)
+        return;
+    const RadialWindow window = windowOf(plan);
+    std::vector<WindowRows> rows(n);
+    threads.run(static_cast<int>(n),
+                [&](int i, int) { rows[i] = windowRows(window, radii[i], plan.windowError); });
+    for (const WindowRows& own : rows) {
+        rowTerms = std::max(rowTerms, own.terms());
+        rowDegree = std::max(rowDegree, own.degree());
+    }
+    const size_t size = size_t(rowDegree + 1) * rowTerms;
+    across.assign(n * size, Real(0));
+    along.assign(n * size, Real(0));
+    for (size_t i = 0; i < n; i++) {
+        if (rows[i].terms() > 0)
+            rowScale[i] = Real(rows[i].scale);
+        for (int j = 0; j < rows[i].terms(); j++)
+            for (int p = 0; p <= rows[i].degree(); p++) {
+                const size_t at = i * size + size_t(rowDegree - p) * rowTerms + j;
+                across[at] = Real(rows[i].across[j].powers[p]);
+                along[at] = Real(rows[i].along[j].powers[p]);
+            }
+    }
+}
+
 template <class Real> void CpuSphereSpread<Real>::begin(int particles) {
     Base::begin(particles);
     offset.resize(3 * size_t(particles));
     placedShape.resize(particles);
+    if (!along.empty())
+        alongWeights.resize(size_t(particles) * rowTerms * SPHERE_LANES);
 }
 
 /** The lowest coordinate that a sphere at u reaches to along axis d, in grid points. */
@@ -132,6 +177,8 @@ void CpuSphereSpread<Real>::place(const std::vector<Vec3>& fractions, int from, 
             offset[3 * size_t(slot) + d] = Real(mine[d] + size[d] * image - u);
         }
     }
+    if (!along.empty())
+        loops.weighRows(spheres(), from, to, alongWeights.data());
 }
 
 template <class Real> GridSpheres<Real> CpuSphereSpread<Real>::spheres() const {
@@ -153,7 +200,12 @@ template <class Real> GridSpheres<Real> CpuSphereSpread<Real>::spheres() const {
             skewY,
             skewX,
             skewZ,
-            sorted.data()};
+            sorted.data(),
+            rowTerms,
+            rowDegree,
+            across.data(),
+            along.data(),
+            alongWeights.data()};
 }
 
 template <class Real> void CpuSphereSpread<Real>::spreadPlane(int x, Real* const planes[3]) const {

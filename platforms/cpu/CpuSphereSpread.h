@@ -12,7 +12,7 @@ namespace PSE {
 /**
  * Unequal spheres: the radial window averaged over each particle's sphere, on one grid [T30, T31].
  * Weights are evaluated where they are used: the spheres of a mixture have too many of them to be
- * kept.
+ * kept. Small spheres of a few radii have rows that are sums of a few products [T54].
  */
 template <class Real> class CpuSphereSpread : public CpuSpread<Real> {
 public:
@@ -34,6 +34,7 @@ private:
     using Base::padded, Base::size, Base::rowLength, Base::planeLength, Base::order,
         Base::columnStart, Base::first, Base::sorted;
     void makeShapes(const numerics::Plan& plan, const Threads& threads);
+    void makeRows(const numerics::Plan& plan, const Threads& threads);
     GridSpheres<Real> spheres() const;
     double lowest(int shape, int d, double u) const;
 
@@ -45,7 +46,11 @@ private:
     std::vector<double> reach;                    ///< of each shape, in radii of the Plan
     std::vector<SphereShape<Real>> shapes;
     std::vector<Real> coefficients, offset;
-    std::vector<int> shapeOf, placedShape; ///< of each particle, and of each place
+    /// [T54] of each shape, 0: rows of it are no sums of a few products
+    std::vector<Real> rowScale;
+    int rowTerms = LEAST_ROW_TERMS, rowDegree = 0;
+    std::vector<Real> across, along, alongWeights; ///< see GridSpheres
+    std::vector<int> shapeOf, placedShape;         ///< of each particle, and of each place
 };
 
 } // namespace PSE

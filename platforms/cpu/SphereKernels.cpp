@@ -248,8 +248,135 @@ template <class D, class Real = hn::TFromD<D>> struct SumVelocities {
     }
 };
 
-template <class Real>
-void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
+/** The same where places are counted from the start of a plane. */
+template <class D, class Real = hn::TFromD<D>> struct SumOfPlane {
+    SumVelocities<D>& sum;
+
+    HWY_INLINE void operator()(size_t at, hn::Vec<D> w) { sum(sum.plane + at, 0, w); }
+};
+
+/** `terms` polynomials of t at once; coefficients[degree + 1][terms], highest powers first. */
+template <int TERMS, class D, class Real = hn::TFromD<D>>
+HWY_INLINE void evaluateTerms(D d, const Real* HWY_RESTRICT coefficients, int degree, hn::Vec<D> t,
+                              hn::Vec<D>* HWY_RESTRICT terms) {
+    for (int j = 0; j < TERMS; j++)
+        terms[j] = hn::Set(d, *coefficients++);
+    for (int power = 1; power <= degree; power++)
+        for (int j = 0; j < TERMS; j++)
+            terms[j] = hn::MulAdd(terms[j], t, hn::Set(d, *coefficients++));
+}
+
+template <int TERMS, class Real>
+void weighRowsOf(const GridSpheres<Real>& g, int from, int to, Real* alongWeights) {
+    const hn::CappedTag<Real, SPHERE_LANES> d;
+    const auto one = hn::Set(d, Real(1));
+    for (int particle = from; particle < to; particle++) {
+        const int kind = g.shape[particle];
+        const Real scale = g.shapes[kind].rowScale;
+        if (scale == 0)
+            continue;
+        Real* HWY_RESTRICT out = alongWeights + size_t(particle) * TERMS * SPHERE_LANES;
+        const Real* HWY_RESTRICT along = g.along + size_t(kind) * TERMS * (g.rowDegree + 1);
+        for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
+            const auto z = hn::Iota(d, g.offset[3 * size_t(particle) + 2] + k);
+            const auto t = hn::MulSub(hn::Mul(hn::Set(d, scale * g.point), z), z, one);
+            hn::Vec<decltype(d)> terms[TERMS];
+            evaluateTerms<TERMS>(d, along, g.rowDegree, hn::Min(t, one), terms);
+            for (int j = 0; j < TERMS; j++)
+                hn::StoreU(hn::IfThenElseZero(hn::Lt(t, one), terms[j]), d,
+                           out + j * SPHERE_LANES + k);
+        }
+    }
+}
+
+/** The rows that a sphere touches in one plane, and the factors of its terms there. */
+template <int TERMS, class Real> struct RowsOfPlane {
+    Real weights[TERMS][SPHERE_LANES]; ///< [term][row]
+    int from, count;                   ///< rows
+    int particle;
+
+    HWY_INLINE void set(const GridSpheres<Real>& g, int sphere, int dx) {
+        particle = sphere;
+        from = count = 0;
+        const hn::CappedTag<Real, SPHERE_LANES> d;
+        const auto one = hn::Set(d, Real(1));
+        const int kind = g.shape[particle];
+        const Real scale = g.shapes[kind].rowScale;
+        const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
+        const Real x = offset[0] + dx;
+        const auto taken = hn::Set(d, scale * g.plane * x * x - 1);
+        const Real* HWY_RESTRICT across = g.across + size_t(kind) * TERMS * (g.rowDegree + 1);
+        for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
+            const auto y = hn::Iota(d, offset[1] + k);
+            const auto t = hn::MulAdd(hn::Mul(hn::Set(d, scale * g.line), y), y, taken);
+            const auto in = hn::Lt(t, one);
+            const int inside = static_cast<int>(hn::CountTrue(d, in));
+            if (inside == 0)
+                continue;
+            if (count == 0)
+                from = k + static_cast<int>(hn::FindKnownFirstTrue(d, in));
+            count += inside;
+            hn::Vec<decltype(d)> terms[TERMS];
+            evaluateTerms<TERMS>(d, across, g.rowDegree, hn::Min(t, one), terms);
+            for (int j = 0; j < TERMS; j++)
+                hn::StoreU(terms[j], d, weights[j] + k);
+        }
+    }
+};
+
+/** Calls work(at, weights) for rows of one plane; `at` is counted from its start. */
+template <int TERMS, class D, class Work, class Real = hn::TFromD<D>>
+HWY_INLINE void visitRows(D d, const GridSpheres<Real>& g, const RowsOfPlane<TERMS, Real>& rows,
+                          Work& work) {
+    const Real* HWY_RESTRICT along = g.alongWeights + size_t(rows.particle) * TERMS * SPHERE_LANES;
+    // what would else be read again after every number that is written
+    const int sizeY = g.size[1], firstY = g.first[3 * size_t(rows.particle) + 1] + rows.from,
+              firstZ = g.first[3 * size_t(rows.particle) + 2], count = rows.count;
+    const size_t rowLength = g.rowLength;
+    for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
+        hn::Vec<D> terms[TERMS];
+        for (int j = 0; j < TERMS; j++)
+            terms[j] = hn::LoadU(d, along + j * SPHERE_LANES + k);
+        int y = firstY;
+        if (y >= sizeY)
+            y %= sizeY;
+        size_t at = y * rowLength + firstZ + k;
+        const Real* HWY_RESTRICT weights = rows.weights[0] + rows.from;
+        for (int row = 0; row < count; row++, weights++) {
+            auto w = hn::Mul(hn::Set(d, weights[0]), terms[0]);
+            for (int j = 1; j < TERMS; j++)
+                w = hn::MulAdd(hn::Set(d, weights[j * SPHERE_LANES]), terms[j], w);
+            work(at, w);
+            at += rowLength;
+            if (++y == sizeY) {
+                at -= sizeY * rowLength;
+                y = 0;
+            }
+        }
+    }
+}
+
+/** Adds one force to rows of three planes. */
+template <class D, class Real = hn::TFromD<D>> struct AddForce {
+    D d;
+    Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
+    hn::Vec<D> forceX, forceY, forceZ;
+
+    HWY_INLINE AddForce(D d, Real* const planes[3], const Real* force)
+        : d(d), x(planes[0]), y(planes[1]), z(planes[2]), forceX(hn::Set(d, force[0])),
+          forceY(hn::Set(d, force[1])), forceZ(hn::Set(d, force[2])) {}
+    HWY_INLINE void operator()(size_t at, hn::Vec<D> w) const {
+        hn::StoreU(hn::MulAdd(w, forceX, hn::LoadU(d, x + at)), d, x + at);
+        hn::StoreU(hn::MulAdd(w, forceY, hn::LoadU(d, y + at)), d, y + at);
+        hn::StoreU(hn::MulAdd(w, forceZ, hn::LoadU(d, z + at)), d, z + at);
+    }
+};
+
+/// spheres whose rows are found before they are visited: latencies overlap
+constexpr int ROW_BATCH = 8;
+
+template <int TERMS, class Real>
+void spreadPlaneOf(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
     const hn::CappedTag<Real, SPHERE_LANES> d;
     const size_t rows = g.size[1];
     for (int c = 0; c < 3; c++)
@@ -257,6 +384,16 @@ void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
             planes[c][i] = 0;
     RowQueue<Real> queue;
     AddForces<decltype(d)> add = {d, g.rowLength, planes[0], planes[1], planes[2], g.forces};
+    RowsOfPlane<TERMS, Real> batch[ROW_BATCH];
+    int batched = 0;
+    const auto visitBatch = [&]() HWY_ATTR {
+        for (int b = 0; b < batched; b++) {
+            const AddForce<decltype(d)> addForce(d, planes,
+                                                 g.forces + 3 * size_t(batch[b].particle));
+            visitRows<TERMS>(d, g, batch[b], addForce);
+        }
+        batched = 0;
+    };
     for (int dx = 0; dx < g.widest; dx++) {
         const int column = (x - dx % g.size[0] + g.size[0]) % g.size[0];
         const int begin = g.columnStart[column * rows], end = g.columnStart[(column + 1) * rows];
@@ -264,35 +401,65 @@ void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
             const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
             if (dx >= shape.extent[0])
                 continue;
-            if (isNarrow(d, g, shape)) {
-                queuePlane(d, g, particle, dx, 0, queue, add);
-                continue;
-            }
             add.particle = particle;
-            visitPlane(d, g, particle, dx, add);
+            if (shape.rowScale > 0) {
+                batch[batched++].set(g, particle, dx);
+                if (batched == ROW_BATCH)
+                    visitBatch();
+            } else if (isNarrow(d, g, shape))
+                queuePlane(d, g, particle, dx, 0, queue, add);
+            else
+                visitPlane(d, g, particle, dx, add);
         }
     }
+    visitBatch();
     workOff(d, g, queue, add);
     for (int c = 0; c < 3; c++)
         for (size_t y = 0; y < rows; y++) {
             Real* row = planes[c] + y * g.rowLength;
-            for (int z = g.size[2]; z < g.size[2] + g.padding; z++)
-                row[z % g.size[2]] += row[z];
+            for (int z = g.size[2], to = 0; z < g.size[2] + g.padding; z++) {
+                row[to] += row[z];
+                if (++to == g.size[2])
+                    to = 0;
+            }
         }
 }
 
-template <class Real>
-void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const grids[3],
-               Real* HWY_RESTRICT u) {
+/** Of a sphere whose rows are sums of products. */
+template <int TERMS, class D, class Real = hn::TFromD<D>>
+HWY_INLINE void gatherRows(D d, const GridSpheres<Real>& g, int particle,
+                           SumVelocities<const D>& sum) {
+    RowsOfPlane<TERMS, Real> batch[ROW_BATCH];
+    const int extent = g.shapes[g.shape[particle]].extent[0];
+    SumOfPlane<const D> inPlane = {sum};
+    int x = g.first[3 * size_t(particle)];
+    for (int from = 0; from < extent; from += ROW_BATCH) {
+        const int planes = extent - from < ROW_BATCH ? extent - from : ROW_BATCH;
+        for (int b = 0; b < planes; b++)
+            batch[b].set(g, particle, from + b);
+        for (int b = 0; b < planes; b++) {
+            sum.plane = x * g.planeLength;
+            visitRows<TERMS>(d, g, batch[b], inPlane);
+            if (++x == g.size[0])
+                x = 0;
+        }
+    }
+}
+
+template <int TERMS, class Real>
+void gatherOf(const GridSpheres<Real>& g, int from, int to, const Real* const grids[3],
+              Real* HWY_RESTRICT u) {
     const hn::CappedTag<Real, SPHERE_LANES> d;
     RowQueue<Real> queue;
     for (int particle = from; particle < to; particle++) {
         SumVelocities<decltype(d)> sum = {d,        g.rowLength, grids[0],    grids[1],
                                           grids[2], hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
-        const bool narrow = isNarrow(d, g, shape);
+        const bool byRows = shape.rowScale > 0, narrow = isNarrow(d, g, shape);
         int x = g.first[3 * size_t(particle)];
-        for (int dx = 0; dx < shape.extent[0]; dx++) {
+        if (byRows)
+            gatherRows<TERMS>(d, g, particle, sum);
+        for (int dx = 0; dx < (byRows ? 0 : shape.extent[0]); dx++) {
             sum.plane = x * g.planeLength;
             if (narrow)
                 queuePlane(d, g, particle, dx, x, queue, sum);
@@ -309,12 +476,57 @@ void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const g
     }
 }
 
+/** Call work with the number of terms as a compile-time constant. */
+template <class Work> HWY_INLINE void forTerms(int terms, Work work) {
+    if (terms <= LEAST_ROW_TERMS)
+        work.template run<LEAST_ROW_TERMS>();
+    else
+        work.template run<MOST_ROW_TERMS>();
+}
+
+template <class Real> struct WeighWork {
+    const GridSpheres<Real>& spheres;
+    int from, to;
+    Real* weights;
+    template <int TERMS> HWY_INLINE void run() const {
+        weighRowsOf<TERMS>(spheres, from, to, weights);
+    }
+};
+template <class Real> struct SpreadWork {
+    const GridSpheres<Real>& spheres;
+    int x;
+    Real* const* planes;
+    template <int TERMS> HWY_INLINE void run() const { spreadPlaneOf<TERMS>(spheres, x, planes); }
+};
+template <class Real> struct GatherWork {
+    const GridSpheres<Real>& spheres;
+    int from, to;
+    const Real* const* grids;
+    Real* u;
+    template <int TERMS> HWY_INLINE void run() const {
+        gatherOf<TERMS>(spheres, from, to, grids, u);
+    }
+};
+
+template <class Real>
+void weighRowsAny(const GridSpheres<Real>& g, int from, int to, Real* alongWeights) {
+    forTerms(g.rowTerms, WeighWork<Real>{g, from, to, alongWeights});
+}
+template <class Real>
+void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
+    forTerms(g.rowTerms, SpreadWork<Real>{g, x, planes});
+}
+template <class Real>
+void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const grids[3], Real* u) {
+    forTerms(g.rowTerms, GatherWork<Real>{g, from, to, grids, u});
+}
+
 // Dispatch tables hold functions, not templates: one name per precision.
 SphereKernels<float> singleSphereKernels() {
-    return {spreadPlaneAny<float>, gatherAny<float>};
+    return {weighRowsAny<float>, spreadPlaneAny<float>, gatherAny<float>};
 }
 SphereKernels<double> doubleSphereKernels() {
-    return {spreadPlaneAny<double>, gatherAny<double>};
+    return {weighRowsAny<double>, spreadPlaneAny<double>, gatherAny<double>};
 }
 
 } // namespace HWY_NAMESPACE

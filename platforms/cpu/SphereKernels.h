@@ -17,7 +17,12 @@ template <class Real> struct SphereShape {
     /// weight = polynomial in t = scale r^2 + shift, r in radii of the Plan, for `least` < t < 1
     Real scale, shift, least;
     int extent[3]; ///< grid points touched along each axis, at most
+    /// 0, or: rows are sums of products [T54], polynomials in t = rowScale d^2 - 1 < 1
+    Real rowScale;
 };
+
+/// terms of such sums
+constexpr int LEAST_ROW_TERMS = 4, MOST_ROW_TERMS = 5;
 
 /** Unequal spheres on the grid, sorted by the column (x, y) of their first grid point. */
 template <class Real> struct GridSpheres {
@@ -38,9 +43,15 @@ template <class Real> struct GridSpheres {
      */
     Real plane, line, point, skewY, skewX, skewZ;
     const Real* forces; ///< [n][3]
+    /// Of shapes with a rowScale, none in a tilted box; both [shapes][rowDegree + 1][rowTerms].
+    int rowTerms, rowDegree;
+    const Real *across, *along;
+    const Real* alongWeights; ///< [n][rowTerms][SPHERE_LANES] `along` at the points of a row
 };
 
 template <class Real> struct SphereKernels {
+    /** Set alongWeights of spheres [from, to), where their shapes have them. */
+    void (*weighRows)(const GridSpheres<Real>& spheres, int from, int to, Real* alongWeights);
     /**
      * Set three planes [y][z] to the forces of all spheres that touch the plane x; row ends are
      * folded back.
