@@ -3,6 +3,7 @@
 #include "numerics/Quadrature.h"
 #include "numerics/SphericalBessel.h"
 #include <algorithm>
+#include <cmath>
 
 namespace PSE::numerics {
 
@@ -33,6 +34,27 @@ std::vector<double> MixtureQuadrature::of(double ai, double aj) const {
     for (size_t i = 0; i < k.size(); i++)
         pair[i] = w[i] * sinc(k[i] * ai) * sinc(k[i] * aj);
     return pair;
+}
+
+MixtureScales::MixtureScales(const Mixture& mixture) {
+    const MixtureQuadrature rule(mixture, 0);
+    k = rule.waveNumbers();
+    for (double weight : rule.weights())
+        w.push_back(2.0 / 3 * weight);
+    growth = 0;
+    for (double a : mixture.radii()) {
+        const double scale = (*this)(a);
+        growth = std::max(growth, 1 / (a * scale * scale));
+    }
+}
+
+double MixtureScales::operator()(double a) const {
+    double wave = 0;
+    for (size_t i = 0; i < k.size(); i++) {
+        const double s = sinc(k[i] * a);
+        wave += w[i] * s * s;
+    }
+    return std::sqrt(std::max(1 / a - wave, LEAST_SHARE / a));
 }
 
 SmoothScalars MixtureQuadrature::at(double r, const std::vector<double>& pair) const {

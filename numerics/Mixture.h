@@ -72,6 +72,28 @@ private:
     std::vector<double> k, w;
 };
 
+/**
+ * What makes the real half of unequal spheres well conditioned [T55]: its noise is
+ * D^{1/2} X^{1/2} z with X = D^{-1/2} M_R D^{-1/2}, D the diagonal of M_R, or LEAST_SHARE of the
+ * whole mobility 1/a where that is more.
+ */
+class MixtureScales {
+public:
+    static constexpr double LEAST_SHARE = 0.05;
+    explicit MixtureScales(const Mixture& mixture);
+    /** D^{1/2} of a radius of the mixture. */
+    double operator()(double a) const;
+    /**
+     * An error of M_R, relative to the mobilities 1/a, is in X at most this many times as large:
+     * the largest 1/(a D).
+     */
+    double errorGrowth() const { return growth; }
+
+private:
+    std::vector<double> k, w; ///< quadrature of the wave part's diagonal, (2/pi) Int H sinc^2 dk
+    double growth = 1;
+};
+
 } // namespace PSE::numerics
 
 #endif

@@ -50,14 +50,15 @@ std::vector<PSE::numerics::Vec3> realProduct(PSE::CpuRealSpace<Real>& space,
                                              const std::vector<PSE::numerics::Vec3>& forces) {
     const size_t n = forces.size();
     PSE::AlignedVector<Real> f(3 * n + 1), out(3 * n);
+    const auto scale = [&](size_t place) { return space.scales() ? space.scales()[place] : 1; };
     for (size_t place = 0; place < n; place++)
         for (int c = 0; c < 3; c++)
-            f[3 * place + c] = Real(forces[space.order()[place]][c]);
+            f[3 * place + c] = Real(forces[space.order()[place]][c]) * scale(place);
     space.multiplyAdd(f, 1, f, 0, out);
     std::vector<PSE::numerics::Vec3> u(n);
     for (size_t place = 0; place < n; place++)
         for (int c = 0; c < 3; c++)
-            u[space.order()[place]][c] = out[3 * place + c];
+            u[space.order()[place]][c] = out[3 * place + c] * scale(place);
     return u;
 }
 

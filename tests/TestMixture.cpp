@@ -258,6 +258,28 @@ TEST(MixtureTable, CoincidentEqualSpheresHaveNoRelativeMobility) {
     }
 }
 
+/** [T55]: scales are roots of the diagonal; never much below the whole mobility. */
+TEST(MixtureScales, AreRootsOfTheDiagonalAndLimited) {
+    const std::vector<double> radii = {0.7, 1, 2, 40};
+    const Mixture mixture(prolate(8, 4.5), radii);
+    const MixtureScales scale(mixture);
+    double growth = 0;
+    for (double a : radii) {
+        // F_W(0) = (2/pi) Int H sinc^2 dk by the midpoint rule
+        const int n = 20000;
+        const double dk = mixture.largestWaveNumber() / n;
+        double wave = 0;
+        for (int i = 0; i < n; i++)
+            wave += 2 / M_PI * dk * mixture.waveWeight((i + 0.5) * dk, a, a);
+        const double limit = MixtureScales::LEAST_SHARE / a;
+        EXPECT_NEAR(scale(a) * scale(a), std::max(1 / a - wave, limit), 1e-7 / a) << a;
+        EXPECT_EQ(a == 40, 1 / a - wave < limit);
+        growth = std::max(growth, 1 / (a * scale(a) * scale(a)));
+    }
+    EXPECT_NEAR(scale.errorGrowth(), growth, 1e-12);
+    EXPECT_NEAR(growth, 1 / MixtureScales::LEAST_SHARE, 1e-9);
+}
+
 TEST(MixtureTable, RadiiThatDifferTooMuchAreRefused) {
     try {
         MixtureTable table(Mixture(prolate(12, 5), logarithmic(1, 100, 20, 6)), 1e-6);

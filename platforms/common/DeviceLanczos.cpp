@@ -45,8 +45,14 @@ int DeviceLanczos::start(const NoiseKey& key) {
     const int expected = iterations > 0 ? iterations : FIRST_ITERATIONS;
     basis.reserve(context, size_t(expected + 1) * places.count(), 4 * realSize(context),
                   "pseBasis");
-    drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), *basis,
-              summary.partialSums());
+    const auto draw = [&](auto&... scaling) {
+        drawNoise(places.count(), places.count(), kernelKey(noise), places.places(), *basis,
+                  summary.partialSums(), scaling...);
+    };
+    if (kindsOfPlaces != nullptr)
+        draw(*kindsOfPlaces, *scalesOfKinds);
+    else
+        draw();
     iterate(0, expected);
     return 2 * expected + 1;
 }

@@ -31,6 +31,15 @@ public:
         return {{"MOST_VECTORS", std::to_string(kind.mostIterations)}};
     }
     void use(const OpenMM::ComputeProgram& program, Expand expand);
+    /**
+     * Of a program of a MIXTURE, before the first start().
+     * @param kinds   of radii, by place
+     * @param scales  D^{1/2} of each kind [T55]
+     */
+    void scaleBy(OpenMM::ComputeArray& kinds, OpenMM::ComputeArray& scales) {
+        kindsOfPlaces = &kinds;
+        scalesOfKinds = &scales;
+    }
 
     /**
      * Draw z and run as many iterations as were needed last, without waiting for them.
@@ -54,6 +63,7 @@ private:
     numerics::LanczosKind kind;
     bool reorthogonalise;
     OpenMM::ComputeArray coefficients, overlaps;
+    OpenMM::ComputeArray *kindsOfPlaces = nullptr, *scalesOfKinds = nullptr;
     GrowingArray basis;
     Expand expand;
     DeviceKernel drawNoise, expandBasis, makeOrthogonal, findOverlaps, removeOverlaps, combineBasis;

@@ -18,6 +18,12 @@ constexpr double SMALLEST_R2 = 1e-30;
 /// of the range, in units of the box: what rounding of fractions may do, and more
 constexpr double REACH_MARGIN = 1e-6;
 
+/** Eigenvalues of the truncated M_R may lie below zero by the error of the truncation. */
+double negativeTolerance(const Plan& plan) {
+    const double growth = plan.mixture ? MixtureScales(*plan.mixture).errorGrowth() : 1;
+    return std::max(2 * plan.predictedError * growth, 1e-10);
+}
+
 /** Append the powers of a polynomial, highest first. */
 void appendCoefficients(const Polynomial& p, std::vector<double>& all) {
     all.insert(all.end(), p.powers.rbegin(), p.powers.rend());
@@ -38,9 +44,8 @@ double DeviceRealSpace::bytesPerParticle(int realSize) {
 DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, const Lattice& box,
                                  DevicePlaces& places, StepSummary& summary, DeviceSpheres* spheres)
     : context(programs.context()), places(places), summary(summary),
-      // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-      lanczos(this->context, places, summary, plan.lanczosTolerance,
-              std::max(2 * plan.predictedError, 1e-10), LanczosTridiagonal::REAL_HALF),
+      lanczos(this->context, places, summary, plan.lanczosTolerance, negativeTolerance(plan),
+              LanczosTridiagonal::REAL_HALF),
       sumImages(plan.sumImages), geometry(programs, "pseGeometry") {
     Defines defines = DeviceLanczos::defines(LanczosTridiagonal::REAL_HALF);
     defines["SMALLEST_R2"] = context.doubleToString(SMALLEST_R2);
@@ -58,6 +63,8 @@ DeviceRealSpace::DeviceRealSpace(DevicePrograms& programs, const Plan& plan, con
                                 ComputeArray& partial) {
         withMatrix(expandBasis, iteration, basis, partial);
     });
+    if (sphereRows)
+        lanczos.scaleBy(spheres->kinds(), sphereRows->scales());
 }
 
 /** Of equal spheres. @return the program that all kernels are from */

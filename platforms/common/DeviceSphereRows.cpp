@@ -69,15 +69,18 @@ void DeviceSphereRows::prepareTables(const Plan& plan, Defines& defines, PlanCon
     uploadReals(tables, context, values, "pseTables");
     const std::vector<double>& radii = plan.mixture->radii();
     const int kinds = static_cast<int>(radii.size()), basis = table.size();
-    std::vector<double> self(kinds), own(interpolates ? size_t(kinds) * basis : 0);
+    const MixtureScales scaleOf(*plan.mixture);
+    std::vector<double> self(kinds), scale(kinds), own(interpolates ? size_t(kinds) * basis : 0);
     forEach(context, kinds, [&](int i) {
         self[i] = table.self(radii[i]);
+        scale[i] = scaleOf(radii[i]);
         if (interpolates) {
             const std::vector<double> c = table.weights(radii[i]);
             std::copy(c.begin(), c.end(), own.begin() + size_t(i) * basis);
         }
     });
     uploadReals(selves, context, self, "pseSelves");
+    uploadReals(scaling, context, scale, "pseScales");
     if (interpolates) {
         uploadReals(weights, context, own, "pseRadiusWeights");
         defines["INTERPOLATED"] = "1";
@@ -94,7 +97,7 @@ double DeviceSphereRows::bytesPerParticle(const Plan& plan, const Lattice& box, 
     const double entry = (plan.sumImages ? sizeof(mm_int2) : sizeof(int)) + 2 * realSize;
     const double n = plan.mixture->particleRadii().size(), kinds = plan.mixture->radii().size();
     const int weights = std::max(plan.radiusFunctions, MixtureTable::MOST_CLASSES);
-    return (entries * entry + kinds * (1 + weights) * realSize) / n;
+    return (entries * entry + kinds * (2 + weights) * realSize) / n;
 }
 
 /** Tell the device how long rows are. @return entries of all of them */

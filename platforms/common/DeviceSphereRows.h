@@ -22,6 +22,8 @@ public:
                                    int realSize);
 
     OpenMM::ComputeProgram program() const { return compiled; }
+    /** What makes M_R of each kind of sphere well conditioned [T55]. */
+    OpenMM::ComputeArray& scales() { return scaling; }
     /** As if made for that box. */
     void setBox(const numerics::Plan& plan, const numerics::Lattice& box);
     void find();
@@ -52,7 +54,8 @@ private:
     size_t entries = 0;             ///< of all rows, 0 before they have their places
     OpenMM::ComputeProgram compiled;
     DeviceNumbers geometry;
-    OpenMM::ComputeArray planConstants, groupRows, groupRadii, counts, tables, weights, selves;
+    OpenMM::ComputeArray planConstants, groupRows, groupRadii, counts, tables, weights, selves,
+        scaling;
     GrowingArray neighbours, pairs, images;
     DeviceKernel findSpheres, evaluatePairs;
 };

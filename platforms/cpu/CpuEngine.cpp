@@ -26,12 +26,13 @@ CpuEngine<Real>::CpuEngine(const Plan& plan, const Lattice& box, double viscosit
                            const std::vector<int>& indices, OpenMM::ThreadPool& pool,
                            StageClock& clock)
     : drag(6 * M_PI * viscosity * plan.a), lanczosTolerance(plan.lanczosTolerance),
-      // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-      negativeTolerance(std::max(2 * plan.predictedError, 1e-10)),
       reorthogonalise(plan.precision == Precision::Double), indices(indices), box(box),
       threads(pool, isSmall(plan, indices.size())), clock(clock), waveSpace(plan, box, threads) {
-    if (plan.hasRealHalf())
-        realSpace.emplace(plan, box, threads);
+    if (!plan.hasRealHalf())
+        return;
+    realSpace.emplace(plan, box, threads);
+    // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
+    negativeTolerance = std::max(2 * plan.predictedError * realSpace->errorGrowth(), 1e-10);
 }
 
 template <class Real> void CpuEngine<Real>::setBox(const Lattice& moved) {
@@ -97,22 +98,25 @@ void CpuEngine<Real>::takeForces(const std::vector<Vec3>& forces, double unit) {
                       [&](int from, int to, int) { waveSpace.takeForces(forces, unit, from, to); });
 }
 
-/** Both halves take their forces, in units of `unit`; realForced = M_R f. */
+/** Both halves take their forces, in units of `unit`; realForced = X D^{1/2} f. */
 template <class Real>
 void CpuEngine<Real>::multiplyReal(const std::vector<Vec3>& forces, double unit) {
     const std::vector<int>& order = realSpace->order();
+    const Real* const scales = realSpace->scales();
     Vector& inPlaces = realSpace->basis(0); // free for this use until Lanczos begins
     realForced.resize(inPlaces.size());
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
-            for (int c = 0; c < 3; c++)
-                inPlaces[3 * size_t(place) + c] = Real(forces[order[place]][c] / unit);
+            for (int c = 0; c < 3; c++) {
+                const Real force = Real(forces[order[place]][c] / unit);
+                inPlaces[3 * size_t(place) + c] = (scales ? scales[place] * force : force);
+            }
         waveSpace.takeForces(forces, unit, from, to);
     });
     realSpace->multiplyAdd(inPlaces, 1, inPlaces, 0, realForced);
 }
 
-/** realThermal = M_R^{1/2} z. */
+/** realThermal = X^{1/2} z. */
 template <class Real> void CpuEngine<Real>::drawReal(const Thermal& thermal) {
     const std::vector<int>& order = realSpace->order();
     Vector& z = realSpace->basis(0);
@@ -127,17 +131,19 @@ template <class Real> void CpuEngine<Real>::drawReal(const Thermal& thermal) {
                                    reorthogonalise);
 }
 
-/** u = unit (realForced + noise realThermal), from places to particles. */
+/** u = unit D^{1/2} (realForced + noise realThermal), from places to particles. */
 template <class Real>
 void CpuEngine<Real>::writeReal(bool forced, Real noise, double unit, std::vector<Vec3>& u) const {
     const std::vector<int>& order = realSpace->order();
+    const Real* const scales = realSpace->scales();
     threads.runBlocks(static_cast<int>(order.size()), [&](int from, int to, int) {
         for (int place = from; place < to; place++)
             for (int c = 0; c < 3; c++) {
+                const double whole = (scales ? unit * double(scales[place]) : unit);
                 const size_t i = 3 * size_t(place) + c;
                 const Real forcedPart = (forced ? realForced[i] : 0),
                            thermalPart = (noise > 0 ? noise * realThermal[i] : 0);
-                u[order[place]][c] = unit * double(forcedPart + thermalPart);
+                u[order[place]][c] = whole * double(forcedPart + thermalPart);
             }
     });
 }

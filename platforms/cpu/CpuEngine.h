@@ -32,7 +32,7 @@ private:
     void writeReal(bool forced, Real noise, double unit, std::vector<numerics::Vec3>& u) const;
 
     double drag; ///< 6 pi eta a
-    double lanczosTolerance, negativeTolerance;
+    double lanczosTolerance, negativeTolerance = 0;
     bool reorthogonalise;
     std::vector<int> indices;
     numerics::Lattice box;

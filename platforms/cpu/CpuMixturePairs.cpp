@@ -12,14 +12,21 @@ template <class Real> CpuMixturePairs<Real>::CpuMixturePairs(const Plan& plan, i
     const Mixture& mixture = *plan.mixture;
     const std::vector<double>& radii = mixture.radii();
     const MixtureTable table(mixture, plan.tableError);
+    const MixtureScales scales(mixture);
+    growth = scales.errorGrowth();
     rc = table.rc();
     largestReach = mixture.reach(radii.back());
     degree = table.degree();
     for (double a : radii) {
+        const double scale = scales(a);
         radiusOf.push_back(Real(a));
         reachOf.push_back(Real(mixture.reach(a)));
-        selfOf.push_back(Real(table.self(a)));
+        selfOf.push_back(Real(table.self(a) / (scale * scale)));
+        scaleOf.push_back(Real(scale));
+        inverseOf.push_back(Real(1 / scale));
     }
+    for (std::vector<Real>* array : {&radiusOf, &inverseOf})
+        array->resize(std::max(radii.size(), size_t(MIXTURE_CLASSES)));
     for (double a : mixture.particleRadii())
         kindOf.push_back(
             static_cast<int32_t>(std::lower_bound(radii.begin(), radii.end(), a) - radii.begin()));
@@ -68,7 +75,7 @@ void CpuMixturePairs<Real>::makeBasis(const MixtureTable& table, const std::vect
 }
 
 template <class Real> void CpuMixturePairs<Real>::begin(int particles) {
-    for (std::vector<Real>* array : {&radius, &reach, &self})
+    for (std::vector<Real>* array : {&reach, &self, &scale})
         array->resize(particles + PAIR_LANES);
     kind.resize(particles + PAIR_LANES);
 }
@@ -78,14 +85,15 @@ void CpuMixturePairs<Real>::place(const std::vector<int>& particleAt, int from, 
     for (int place = from; place < to; place++) {
         const int32_t own = kindOf[particleAt[place]];
         kind[place] = own;
-        radius[place] = radiusOf[own];
         reach[place] = reachOf[own];
         self[place] = selfOf[own];
+        scale[place] = scaleOf[own];
     }
 }
 
 template <class Real> MixturePairs<Real> CpuMixturePairs<Real>::pairs() const {
-    return {radius.data(), reach.data(), Real(rc), degree, basis, kind.data(), weights.data()};
+    return {reach.data(), kind.data(), radiusOf.data(), inverseOf.data(),
+            Real(rc),     degree,      basis,           weights.data()};
 }
 
 /** The polynomials of the pairs of place i: P_n = sum over m of c_m(ai) (polynomial m, n). */
@@ -103,8 +111,8 @@ template <class Real> MixtureRow<Real> CpuMixturePairs<Real>::rowOf(int thread, 
 
 template <class Real>
 int CpuMixturePairs<Real>::fillRow(int thread, const PairGeometry<Real>& geometry, int i,
-                                   const PairRun* runs, int numRuns, int32_t* scratch,
-                                   PairBlock<Real>* row) {
+                                   const PairRun* runs, int numRuns,
+                                   const PairScratch<Real>& scratch, PairBlock<Real>* row) {
     return kernels.fillRow(geometry, pairs(), rowOf(thread, i), i, runs, numRuns, scratch, row);
 }
 

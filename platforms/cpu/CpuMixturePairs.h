@@ -27,9 +27,14 @@ public:
     double range(int i, int j) const { return double(reach[i]) + double(reach[j]); }
     /** Diagonal blocks, by place. */
     const Real* selves() const { return self.data(); }
+    /** What M_R is scaled by on both sides, by place: its rows are those of the scaled one [T55].
+     */
+    const Real* scales() const { return scale.data(); }
+    /** See MixtureScales. */
+    double errorGrowth() const { return growth; }
     /** See PairKernels::fillRow(). */
     int fillRow(int thread, const PairGeometry<Real>& geometry, int i, const PairRun* runs,
-                int numRuns, int32_t* scratch, PairBlock<Real>* row);
+                int numRuns, const PairScratch<Real>& scratch, PairBlock<Real>* row);
     /** See PairKernels::evaluateBlocks(). */
     void evaluateRow(int thread, int i, int count, int last, PairBlock<Real>* row);
 
@@ -40,17 +45,17 @@ private:
     MixtureRow<Real> rowOf(int thread, int i);
 
     MixturePairKernels<Real> kernels = mixturePairKernels<Real>();
-    double rc, largestReach;
+    double rc, largestReach, growth;
     int degree, basis; ///< see MixturePairs
-    /// of each distinct radius
-    std::vector<Real> radiusOf, reachOf, selfOf;
+    /// of each distinct radius, MIXTURE_CLASSES at least; self of the scaled M_R
+    std::vector<Real> radiusOf, reachOf, selfOf, scaleOf, inverseOf;
     std::vector<int32_t> kindOf; ///< of each particle
     /// of few radii: [radius][F, C][degree + 1][MIXTURE_CLASSES]; of many: [m][F, C][degree +
     /// 1][basis], to be combined for each row
     std::vector<Real> functions;
-    std::vector<Real> weights;             ///< [distinct radii][basis]
-    std::vector<std::vector<Real>> rows;   ///< [thread] room for a row's own functions
-    std::vector<Real> radius, reach, self; ///< by place
+    std::vector<Real> weights;            ///< [distinct radii][basis]
+    std::vector<std::vector<Real>> rows;  ///< [thread] room for a row's own functions
+    std::vector<Real> reach, self, scale; ///< by place
     std::vector<int32_t> kind;
 };
 

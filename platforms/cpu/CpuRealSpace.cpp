@@ -204,11 +204,19 @@ int CpuRealSpace<Real>::findRuns(const Vec3& s, double share, PairRun* runs) con
     return n;
 }
 
+template <class Real> PairScratch<Real> CpuRealSpace<Real>::Candidates::room(size_t count) {
+    if (found.size() < count) {
+        found.resize(count);
+        for (std::vector<Real>* axis : {&dx, &dy, &dz})
+            axis->resize(count);
+    }
+    return {found.data(), dx.data(), dy.data(), dz.data()};
+}
+
 template <class Real>
 void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3>& fractions) {
     const PairPolynomials<Real> table = polynomials();
     const PairGeometry<Real> positions = geometry();
-    std::vector<int32_t>& scratch = candidateRoom[thread];
     PairRun runs[2 * MOST_CELLS * MOST_CELLS];
     std::vector<PairBlock<Real>>& mine = blocks[task];
     const int from = Threads::from(task), to = Threads::to(task, static_cast<int>(rowStart.size()));
@@ -219,8 +227,7 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
         size_t candidates = PAIR_LANES;
         for (int r = 0; r < numRuns; r++)
             candidates += runs[r].end - runs[r].begin;
-        if (scratch.size() < candidates)
-            scratch.resize(candidates);
+        const PairScratch<Real> scratch = candidateRoom[thread].room(candidates);
         const size_t needed = used + candidates / PAIR_LANES;
         if (mine.size() < needed) {
             const double likely = ROOM * used / std::max(1, i - from) * (to - from);
@@ -229,9 +236,8 @@ void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3
         }
         rowStart[i] = used;
         PairBlock<Real>* const row = mine.data() + used;
-        rowCount[i] =
-            mixture ? mixture->fillRow(thread, positions, i, runs, numRuns, scratch.data(), row)
-                    : kernels.fillRow(positions, table, i, runs, numRuns, scratch.data(), row);
+        rowCount[i] = mixture ? mixture->fillRow(thread, positions, i, runs, numRuns, scratch, row)
+                              : kernels.fillRow(positions, table, i, runs, numRuns, scratch, row);
         used += rowCount[i];
     }
 }

@@ -43,7 +43,14 @@ public:
     /** The particle at each place. */
     const std::vector<int>& order() const { return particleAt; }
 
-    /** out = s M_R v + t w. @return v . out */
+    /**
+     * Of a mixture, what the vectors of M_R are to be multiplied by, at each place, before and
+     * after its products, which are those of the scaled matrix X [T55]; else NULL: X is M_R.
+     */
+    const Real* scales() const { return mixture ? mixture->scales() : nullptr; }
+    /** An error of M_R is in X at most this many times as large. */
+    double errorGrowth() const { return mixture ? mixture->errorGrowth() : 1; }
+    /** out = s X v + t w. @return v . out */
     double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out) const;
 
 private:
@@ -74,7 +81,13 @@ private:
     std::vector<typename PairCoordinate<Real>::Type> axes[3];
     std::vector<std::vector<PairBlock<Real>>> blocks; ///< one array per task of Threads::runBlocks
     std::vector<int32_t> rowStart, rowCount;          ///< [n], in the blocks of the row's task
-    std::vector<std::vector<int32_t>> candidateRoom;  ///< one per thread
+    /** Room for candidates, of one thread. */
+    struct Candidates {
+        std::vector<int32_t> found;
+        std::vector<Real> dx, dy, dz;
+        PairScratch<Real> room(size_t count);
+    };
+    std::vector<Candidates> candidateRoom; ///< one per thread
 };
 
 } // namespace PSE

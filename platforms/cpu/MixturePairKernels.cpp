@@ -15,21 +15,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/** What the lanes of a block need of the neighbours' radii. */
-template <class Real> struct Neighbours {
-    Real radius[PAIR_LANES];
-    std::conditional_t<sizeof(Real) == 4, int32_t, int64_t> kind[PAIR_LANES];
-    const Real* weights[PAIR_LANES];
-
-    HWY_INLINE Neighbours(const MixturePairs<Real>& pairs, const int32_t* HWY_RESTRICT found) {
-        for (int k = 0; k < PAIR_LANES; k++) {
-            const int j = found[k];
-            radius[k] = pairs.radius[j];
-            kind[k] = pairs.kind[j];
-            weights[k] = pairs.weights + size_t(kind[k]) * pairs.basis;
-        }
-    }
-};
+/** An integer as wide as a Real. */
+template <class Real> using Kind = std::conditional_t<sizeof(Real) == 4, int32_t, int64_t>;
 
 /** One number out of MIXTURE_CLASSES for each lane. */
 template <class D, class Indices, class Real = hn::TFromD<D>>
@@ -40,31 +27,40 @@ HWY_INLINE hn::Vec<D> chosen(D d, const Real* HWY_RESTRICT numbers, Indices kind
         return hn::GatherIndex(d, numbers, kinds);
 }
 
-/** The wave part in lanes from k on, each with its own polynomial out of a few. */
+/** What pairs with lanes of spheres of these kinds need to know of them. */
+template <class D> struct OtherSpheres { hn::Vec<D> radius, inverse, waveF, waveC; };
+
+/** Each with its own polynomial out of a few. */
 template <class D, class Real, class V = hn::Vec<D>>
-HWY_INLINE void waveOfClasses(D d, const MixturePairs<Real>& pairs, const MixtureRow<Real>& table,
-                              const Neighbours<Real>& near, int k, V t, V& F, V& C) {
-    const auto kinds = hn::LoadU(hn::RebindToSigned<D>(), near.kind + k);
-    F = chosen(d, table.F, kinds);
-    C = chosen(d, table.C, kinds);
+HWY_INLINE OtherSpheres<D> ofClasses(D d, const MixturePairs<Real>& pairs,
+                                     const MixtureRow<Real>& table,
+                                     const Kind<Real>* HWY_RESTRICT of, V t) {
+    const auto kinds = hn::LoadU(hn::RebindToSigned<D>(), of);
+    auto F = chosen(d, table.F, kinds), C = chosen(d, table.C, kinds);
     for (int power = 1; power <= pairs.degree; power++) {
         F = hn::MulAdd(F, t, chosen(d, table.F + power * MIXTURE_CLASSES, kinds));
         C = hn::MulAdd(C, t, chosen(d, table.C + power * MIXTURE_CLASSES, kinds));
     }
+    return {chosen(d, pairs.radius, kinds), chosen(d, pairs.inverse, kinds), F, C};
 }
 
-/** The same with a weight for each basis function. */
+/** Each with weights of the basis functions. */
 template <class D, class Real, class V = hn::Vec<D>>
-HWY_INLINE void waveOfBasis(D d, const MixturePairs<Real>& pairs, const MixtureRow<Real>& table,
-                            const Neighbours<Real>& near, int k, V t, V& F, V& C) {
+HWY_INLINE OtherSpheres<D> ofBasis(D d, const MixturePairs<Real>& pairs,
+                                   const MixtureRow<Real>& table, const Kind<Real>* HWY_RESTRICT of,
+                                   V t) {
     constexpr int MOST = 64; // more than MixtureTable::MOST_BASIS
-    Real weights[MOST * PAIR_LANES];
+    Real weights[MOST * PAIR_LANES], radius[PAIR_LANES], inverse[PAIR_LANES];
     const int lanes = static_cast<int>(hn::Lanes(d));
-    for (int lane = 0; lane < lanes; lane++)
+    for (int lane = 0; lane < lanes; lane++) {
+        const Real* own = pairs.weights + size_t(of[lane]) * pairs.basis;
+        radius[lane] = pairs.radius[of[lane]];
+        inverse[lane] = pairs.inverse[of[lane]];
         for (int n = 0; n < pairs.basis; n++)
-            weights[n * lanes + lane] = near.weights[k + lane][n];
+            weights[n * lanes + lane] = own[n];
+    }
     const Real *HWY_RESTRICT rowF = table.F, *HWY_RESTRICT rowC = table.C;
-    F = C = hn::Zero(d);
+    V F = hn::Zero(d), C = hn::Zero(d);
     for (int power = 0; power <= pairs.degree; power++) {
         auto ownF = hn::Zero(d), ownC = hn::Zero(d);
         for (int n = 0; n < pairs.basis; n++) {
@@ -75,51 +71,64 @@ HWY_INLINE void waveOfBasis(D d, const MixturePairs<Real>& pairs, const MixtureR
         F = hn::MulAdd(F, t, ownF);
         C = hn::MulAdd(C, t, ownC);
     }
+    return {hn::LoadU(d, radius), hn::LoadU(d, inverse), F, C};
 }
 
-/** F and C of one block of particle i; lanes from `used` on count for nothing. */
-template <class Real>
+/** Scaled F and C of one block of particle i; lanes from `used` on count for nothing. */
+template <bool CLASSES, class Real>
 HWY_INLINE void evaluateBlock(const MixturePairs<Real>& pairs, const MixtureRow<Real>& table, int i,
-                              const Neighbours<Real>& near, int used, PairBlock<Real>& p) {
+                              const int32_t* HWY_RESTRICT found, int used, PairBlock<Real>& p) {
     const hn::CappedTag<Real, PAIR_LANES> d;
-    const auto ai = hn::Set(d, pairs.radius[i]);
+    Kind<Real> kinds[PAIR_LANES];
+    for (int k = 0; k < PAIR_LANES; k++)
+        kinds[k] = pairs.kind[found[k]];
+    const int own = pairs.kind[i];
+    const auto ai = hn::Set(d, pairs.radius[own]), inverse = hn::Set(d, pairs.inverse[own]);
     const auto scale = hn::Set(d, Real(2 / (double(pairs.rc) * pairs.rc)));
     for (int k = 0; k < PAIR_LANES; k += static_cast<int>(hn::Lanes(d))) {
         const auto dx = hn::LoadU(d, p.dx + k), dy = hn::LoadU(d, p.dy + k),
                    dz = hn::LoadU(d, p.dz + k);
         const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
         const auto t = hn::MulSub(scale, r2, hn::Set(d, Real(1)));
-        hn::Vec<decltype(d)> F, C, waveF, waveC;
+        hn::Vec<decltype(d)> F, C;
         const auto safe2 = hn::Max(r2, hn::Set(d, Real(SMALLEST_R2<Real>)));
-        rpyOfUnequal(d, safe2, hn::Div(hn::Set(d, Real(1)), hn::Sqrt(safe2)), ai,
-                     hn::LoadU(d, near.radius + k), F, C);
-        if (pairs.basis == 0)
-            waveOfClasses(d, pairs, table, near, k, t, waveF, waveC);
-        else
-            waveOfBasis(d, pairs, table, near, k, t, waveF, waveC);
+        const auto other = CLASSES ? ofClasses(d, pairs, table, kinds + k, t)
+                                   : ofBasis(d, pairs, table, kinds + k, t);
+        rpyOfUnequal(d, safe2, hn::Div(hn::Set(d, Real(1)), hn::Sqrt(safe2)), ai, other.radius, F,
+                     C);
         const int left = used - k; // in these lanes
         const auto inUse = hn::FirstN(d, left > 0 ? size_t(left) : 0);
-        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(F, waveF)), d, p.F + k);
-        hn::StoreU(hn::IfThenElseZero(inUse, hn::Sub(C, waveC)), d, p.C + k);
+        const auto both = hn::IfThenElseZero(inUse, hn::Mul(inverse, other.inverse));
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Mul(both, hn::Sub(F, other.waveF))), d, p.F + k);
+        hn::StoreU(hn::IfThenElseZero(inUse, hn::Mul(both, hn::Sub(C, other.waveC))), d, p.C + k);
+    }
+}
+
+template <bool CLASSES, class Real>
+void evaluateBlocksOf(const MixturePairs<Real>& pairs, const MixtureRow<Real>& table, int i,
+                      int count, int last, PairBlock<Real>* blocks) {
+    for (int b = 0; b < count; b++) {
+        int32_t found[PAIR_LANES];
+        for (int k = 0; k < PAIR_LANES; k++)
+            found[k] = blocks[b].offset[k] / 3;
+        evaluateBlock<CLASSES>(pairs, table, i, found, b == count - 1 ? last : PAIR_LANES,
+                               blocks[b]);
     }
 }
 
 template <class Real>
 void evaluateBlocksAny(const MixturePairs<Real>& pairs, const MixtureRow<Real>& table, int i,
                        int count, int last, PairBlock<Real>* blocks) {
-    for (int b = 0; b < count; b++) {
-        int32_t found[PAIR_LANES];
-        for (int k = 0; k < PAIR_LANES; k++)
-            found[k] = blocks[b].offset[k] / 3;
-        evaluateBlock(pairs, table, i, Neighbours<Real>(pairs, found),
-                      b == count - 1 ? last : PAIR_LANES, blocks[b]);
-    }
+    if (pairs.basis == 0)
+        evaluateBlocksOf<true>(pairs, table, i, count, last, blocks);
+    else
+        evaluateBlocksOf<false>(pairs, table, i, count, last, blocks);
 }
 
-template <class Real>
-int fillRowAny(const PairGeometry<Real>& geometry, const MixturePairs<Real>& pairs,
-               const MixtureRow<Real>& table, int i, const PairRun* runs, int numRuns,
-               int32_t* found, PairBlock<Real>* row) {
+template <bool CLASSES, class Real>
+int fillRowOf(const PairGeometry<Real>& geometry, const MixturePairs<Real>& pairs,
+              const MixtureRow<Real>& table, int i, const PairRun* runs, int numRuns,
+              const PairScratch<Real>& scratch, PairBlock<Real>* row) {
     const Real own = pairs.reach[i];
     return fillRowWith(
         geometry, i,
@@ -127,10 +136,18 @@ int fillRowAny(const PairGeometry<Real>& geometry, const MixturePairs<Real>& pai
             const auto range = hn::Add(hn::Set(d, own), hn::LoadU(d, pairs.reach + j));
             return hn::Mul(range, range);
         },
-        [&](const int32_t* neighbours, int used, PairBlock<Real>& block) HWY_ATTR {
-            evaluateBlock(pairs, table, i, Neighbours<Real>(pairs, neighbours), used, block);
-        },
-        runs, numRuns, found, row);
+        [&](const int32_t* neighbours, int used, PairBlock<Real>& block)
+            HWY_ATTR { evaluateBlock<CLASSES>(pairs, table, i, neighbours, used, block); },
+        runs, numRuns, scratch, row);
+}
+
+template <class Real>
+int fillRowAny(const PairGeometry<Real>& geometry, const MixturePairs<Real>& pairs,
+               const MixtureRow<Real>& table, int i, const PairRun* runs, int numRuns,
+               const PairScratch<Real>& scratch, PairBlock<Real>* row) {
+    return pairs.basis == 0
+               ? fillRowOf<true>(geometry, pairs, table, i, runs, numRuns, scratch, row)
+               : fillRowOf<false>(geometry, pairs, table, i, runs, numRuns, scratch, row);
 }
 
 template <class Real>

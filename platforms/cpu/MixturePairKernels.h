@@ -18,11 +18,13 @@ constexpr int MIXTURE_CLASSES = 8;
  * place can be read up to PAIR_LANES places beyond their ends.
  */
 template <class Real> struct MixturePairs {
-    const Real *radius, *reach; ///< [n], in radii of the Plan; a pair ends at the sum of reaches
+    const Real* reach;   ///< [n], in radii of the Plan; a pair ends at the sum of reaches
+    const int32_t* kind; ///< [n] index of the distinct radius
+    const Real* radius;  ///< [distinct radii, MIXTURE_CLASSES at least]
+    const Real* inverse; ///< the same, what F and C are multiplied by for either sphere [T55]
     Real rc;
     int degree;
-    int basis; ///< number of basis functions; 0: one for each distinct radius, chosen by `kind`
-    const int32_t* kind; ///< [n] index of the distinct radius
+    int basis;           ///< number of basis functions; 0: one for each distinct radius
     const Real* weights; ///< [distinct radii][basis] c_n
 };
 
@@ -36,7 +38,7 @@ template <class Real> struct MixturePairKernels {
     /** PairKernels::fillRow() for unequal radii. */
     int (*fillRow)(const PairGeometry<Real>& geometry, const MixturePairs<Real>& pairs,
                    const MixtureRow<Real>& table, int i, const PairRun* runs, int numRuns,
-                   int32_t* scratch, PairBlock<Real>* row);
+                   const PairScratch<Real>& scratch, PairBlock<Real>* row);
     /** PairKernels::evaluateBlocks() for the row of particle i. */
     void (*evaluateBlocks)(const MixturePairs<Real>& pairs, const MixtureRow<Real>& table, int i,
                            int count, int last, PairBlock<Real>* blocks);

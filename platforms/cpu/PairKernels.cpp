@@ -86,20 +86,22 @@ void evaluateBlocksAny(const PairPolynomials<Real>& table, int count, int last,
 
 template <template <class> class Branches, class Real>
 int fillRowOf(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
-              const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
+              const PairRun* runs, int numRuns, const PairScratch<Real>& scratch,
+              PairBlock<Real>* row) {
     const Real range2 = geometry.range * geometry.range;
     return fillRowWith(
         geometry, i, [&](auto d, int) HWY_ATTR { return hn::Set(d, range2); },
         [&](const int32_t*, int used, PairBlock<Real>& block)
             HWY_ATTR { evaluateBlock<Branches>(table, used, block); },
-        runs, numRuns, found, row);
+        runs, numRuns, scratch, row);
 }
 
 template <class Real>
 int fillRowAny(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
-               const PairRun* runs, int numRuns, int32_t* found, PairBlock<Real>* row) {
-    return table.rpy ? fillRowOf<RpyBranches>(geometry, table, i, runs, numRuns, found, row)
-                     : fillRowOf<NoBranches>(geometry, table, i, runs, numRuns, found, row);
+               const PairRun* runs, int numRuns, const PairScratch<Real>& scratch,
+               PairBlock<Real>* row) {
+    return table.rpy ? fillRowOf<RpyBranches>(geometry, table, i, runs, numRuns, scratch, row)
+                     : fillRowOf<NoBranches>(geometry, table, i, runs, numRuns, scratch, row);
 }
 
 /** Sum of v w, accumulated in double. */

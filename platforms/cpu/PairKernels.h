@@ -76,15 +76,21 @@ struct PairRun {
     int begin, end;
 };
 
+/** Room for the neighbours of one particle: as many as candidates, and PAIR_LANES more. */
+template <class Real> struct PairScratch {
+    int32_t* found; ///< their places
+    Real *dx, *dy, *dz;
+};
+
 template <class Real> struct PairKernels {
     /**
      * Write the row of particle i: those of the candidates whose nearest image lies within the
-     * range, itself excepted, in their order. `row` has room for all of them, and `scratch` for
-     * PAIR_LANES more.
+     * range, itself excepted, in their order. `row` has room for all of them.
      * @return the number of blocks
      */
     int (*fillRow)(const PairGeometry<Real>& geometry, const PairPolynomials<Real>& table, int i,
-                   const PairRun* runs, int numRuns, int32_t* scratch, PairBlock<Real>* row);
+                   const PairRun* runs, int numRuns, const PairScratch<Real>& scratch,
+                   PairBlock<Real>* row);
     /**
      * F and C of `count` blocks whose neighbours and displacements are set; lanes from `last` on in
      * the last one are unused.

@@ -80,13 +80,14 @@ template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int3
 }
 
 /**
- * Collect the neighbours of particle i among the candidates, without a branch for each of them.
+ * Collect the neighbours of particle i among the candidates, without a branch for each of them,
+ * and the displacements from them.
  * @param range2  range2(d, j): squared ranges of pairs of i with the particles from j on
  * @return how many there are
  */
 template <class Real, class SquaredRange>
 HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange range2,
-                              const PairRun* runs, int numRuns, int32_t* HWY_RESTRICT found) {
+                              const PairRun* runs, int numRuns, const PairScratch<Real>& out) {
     const hn::CappedTag<Real, PAIR_LANES> d;
     const IndexTag<decltype(d)> di;
     using Index = hn::TFromD<decltype(di)>;
@@ -104,7 +105,11 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
             const auto candidate =
                 hn::And(hn::Lt(index, hn::Set(di, Index(runs[r].end))), hn::Ne(index, self));
             const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2(d, j))), candidate);
-            storeIndices(di, hn::Compress(index, in), found + n);
+            const auto inRange = hn::RebindMask(d, in);
+            storeIndices(di, hn::Compress(index, in), out.found + n);
+            hn::StoreU(hn::Compress(dx, inRange), d, out.dx + n);
+            hn::StoreU(hn::Compress(dy, inRange), d, out.dy + n);
+            hn::StoreU(hn::Compress(dz, inRange), d, out.dz + n);
             n += hn::CountTrue(di, in);
         }
     return static_cast<int>(n);
@@ -117,34 +122,28 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
  */
 template <class Real, class SquaredRange, class Evaluate>
 HWY_INLINE int fillRowWith(const PairGeometry<Real>& geometry, int i, SquaredRange range2,
-                           Evaluate evaluate, const PairRun* runs, int numRuns, int32_t* found,
-                           PairBlock<Real>* row) {
+                           Evaluate evaluate, const PairRun* runs, int numRuns,
+                           const PairScratch<Real>& scratch, PairBlock<Real>* row) {
     const hn::CappedTag<Real, PAIR_LANES> d;
-    const Displacement<decltype(d)> displacement(d, geometry, i);
-    const int n = findNeighbours(geometry, i, range2, runs, numRuns, found);
-    for (int k = n; k < n + PAIR_LANES; k++) // lanes of the last block that no neighbour fills
-        found[k] = i;
+    const hn::CappedTag<int32_t, PAIR_LANES> di;
+    const int n = findNeighbours(geometry, i, range2, runs, numRuns, scratch);
+    for (int k = n; k < n + PAIR_LANES; k++) { // lanes of the last block that no neighbour fills
+        scratch.found[k] = i;
+        scratch.dx[k] = scratch.dy[k] = scratch.dz[k] = 0;
+    }
     const int blocks = (n + PAIR_LANES - 1) / PAIR_LANES;
     for (int b = 0; b < blocks; b++) {
         PairBlock<Real>& block = row[b];
         const int begin = b * PAIR_LANES;
-        typename PairCoordinate<Real>::Type x[PAIR_LANES], y[PAIR_LANES], z[PAIR_LANES];
-        for (int k = 0; k < PAIR_LANES; k++) {
-            const int j = found[begin + k];
-            block.offset[k] = 3 * j;
-            x[k] = geometry.x[j];
-            y[k] = geometry.y[j];
-            z[k] = geometry.z[j];
-        }
+        for (size_t k = 0; k < PAIR_LANES; k += hn::Lanes(di))
+            hn::StoreU(hn::Mul(hn::LoadU(di, scratch.found + begin + k), hn::Set(di, 3)), di,
+                       block.offset + k);
         for (size_t k = 0; k < PAIR_LANES; k += hn::Lanes(d)) {
-            hn::Vec<decltype(d)> dx, dy, dz;
-            displacement.of(loadCoordinates(d, x + k), loadCoordinates(d, y + k),
-                            loadCoordinates(d, z + k), dx, dy, dz);
-            hn::StoreU(dx, d, block.dx + k);
-            hn::StoreU(dy, d, block.dy + k);
-            hn::StoreU(dz, d, block.dz + k);
+            hn::StoreU(hn::LoadU(d, scratch.dx + begin + k), d, block.dx + k);
+            hn::StoreU(hn::LoadU(d, scratch.dy + begin + k), d, block.dy + k);
+            hn::StoreU(hn::LoadU(d, scratch.dz + begin + k), d, block.dz + k);
         }
-        evaluate(found + begin, n - begin < PAIR_LANES ? n - begin : PAIR_LANES, block);
+        evaluate(scratch.found + begin, n - begin < PAIR_LANES ? n - begin : PAIR_LANES, block);
     }
     return blocks;
 }

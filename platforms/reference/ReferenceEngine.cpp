@@ -28,8 +28,12 @@ void ReferenceEngine::prepareRealHalf() {
         return;
     }
     mixtureTable.reset(new MixtureTable(*plan.mixture, plan.tableError));
-    for (double a : plan.mixture->particleRadii())
+    const MixtureScales scaleOf(*plan.mixture);
+    errorGrowth = scaleOf.errorGrowth();
+    for (double a : plan.mixture->particleRadii()) {
         realSelf.push_back(mixtureTable->self(a));
+        scales.push_back(scaleOf(a));
+    }
 }
 
 void ReferenceEngine::setBox(const Lattice& moved) {
@@ -145,6 +149,20 @@ void ReferenceEngine::multiplyReal(const Vectors& v, Vectors& out) const {
     }
 }
 
+/** out = X v, the scaled M_R of a mixture, or M_R itself. */
+void ReferenceEngine::multiplyScaled(const Vectors& v, Vectors& out) const {
+    if (scales.empty()) {
+        multiplyReal(v, out);
+        return;
+    }
+    Vectors unscaled(v);
+    for (size_t i = 0; i < v.size(); i++)
+        unscaled[i] /= scales[i];
+    multiplyReal(unscaled, out);
+    for (size_t i = 0; i < v.size(); i++)
+        out[i] /= scales[i];
+}
+
 void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vectors& u) {
     Vectors part(u.size());
     if (forces != NULL) {
@@ -154,16 +172,17 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
     }
     if (thermal != NULL) {
         LanczosSpace space(u.size(),
-                           [this](const Vectors& v, Vectors& out) { multiplyReal(v, out); });
+                           [this](const Vectors& v, Vectors& out) { multiplyScaled(v, out); });
         Vectors& z = space.basis(0);
         for (size_t i = 0; i < u.size(); i++)
             particleNoise(thermal->real, indices[i], z[i].data());
         // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-        iterations = lanczosSquareRoot(space, part, LANCZOS_TOLERANCE,
-                                       std::max(2 * plan.predictedError, 1e-10), true);
+        iterations =
+            lanczosSquareRoot(space, part, LANCZOS_TOLERANCE,
+                              std::max(2 * plan.predictedError * errorGrowth, 1e-10), true);
         const double scale = std::sqrt(2 * thermal->kT * selfMobility / thermal->dt);
         for (size_t i = 0; i < u.size(); i++)
-            u[i] += scale * part[i];
+            u[i] += (scales.empty() ? scale : scale * scales[i]) * part[i];
     }
 }
 

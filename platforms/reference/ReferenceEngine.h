@@ -49,6 +49,7 @@ private:
     void preparePhases();
     /** out = M_R v, in units of 1/(6 pi eta a). */
     void multiplyReal(const Vectors& v, Vectors& out) const;
+    void multiplyScaled(const Vectors& v, Vectors& out) const;
     void addReal(const Vectors* forces, const Thermal* thermal, Vectors& u);
     void addWaves(const Vectors* forces, const Thermal* thermal, Vectors& u) const;
     std::complex<double> phase(int particle, const Mode& mode) const;
@@ -61,6 +62,8 @@ private:
     numerics::RealTable table;                                  ///< of equal spheres
     std::unique_ptr<const numerics::MixtureTable> mixtureTable; ///< of unequal ones
     std::vector<double> realSelf;                               ///< diagonal of M_R, by particle
+    std::vector<double> scales;                                 ///< of a mixture, by particle [T55]
+    double errorGrowth = 1;                                     ///< see MixtureScales
     std::vector<Mode> modes;                                    ///< one of each pair n, -n
     Vectors positions;                                          ///< in the primary box
     /// each unordered pair (and image) once; i == j for images of a particle itself

@@ -5,16 +5,34 @@
 // The Lanczos process leaves its basis vectors v_i unnormalised, basis[i][n]; `partial` holds one
 // row of sums over groups for each |v_i|^2 (row 2i) and each v_i . M v_i (row 2i+1).
 
+// With MIXTURE it is the square root of X = D^{-1/2} M D^{-1/2} [T55]. What is kept of its vectors is
+// y = D^{-1/2} v, with D as the fourth number: X v is D^{-1} M y then, and v . w is D y . z.
+#ifdef MIXTURE
+#define WEIGHT(y) (y).w
+#else
+#define WEIGHT(y) 1
+#endif
+
 /** Basis vector 0: normal numbers of the particles. */
 KERNEL void drawNoise(int n, int4 key, GLOBAL const fraction4* RESTRICT places, GLOBAL real4* RESTRICT basis,
-        GLOBAL mixed* RESTRICT partial) {
+        GLOBAL mixed* RESTRICT partial
+#ifdef MIXTURE
+        , GLOBAL const int* RESTRICT kinds, GLOBAL const real* RESTRICT scales
+#endif
+        ) {
     LOCAL mixed buffer[GROUP_SIZE];
     mixed square = 0;
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         real z[3];
         particleNoise(key.x, key.y, key.z, key.w, (unsigned int) places[i].w, z);
+#ifdef MIXTURE
+        const real scale = scales[kinds[i]];
+        const real4 own = make_real4(z[0], z[1], z[2], 0);
+        basis[i] = make_real4(z[0]/scale, z[1]/scale, z[2]/scale, scale*scale);
+#else
         const real4 own = make_real4(z[0], z[1], z[2], 0);
         basis[i] = own;
+#endif
         square += dotProduct(own, own);
     }
     square = sumInGroup(buffer, square);
@@ -35,11 +53,17 @@ KERNEL void expandBasis(MATRIX_PARAMETERS, int iteration, GLOBAL real4* RESTRICT
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         real4 next = ROW_PRODUCT(i, current);
         const real4 last = iteration > 0 ? basis[(iteration-1)*(mm_long) n+i] : make_real4(0, 0, 0, 0);
-        next.x = s*next.x-t*last.x;
-        next.y = s*next.y-t*last.y;
-        next.z = s*next.z-t*last.z;
+#ifdef MIXTURE
+        const real weight = current[i].w, own = s/weight;
+        next.w = weight;
+#else
+        const real own = s;
+#endif
+        next.x = own*next.x-t*last.x;
+        next.y = own*next.y-t*last.y;
+        next.z = own*next.z-t*last.z;
         basis[(iteration+1)*(mm_long) n+i] = next;
-        overlap += dotProduct(current[i], next);
+        overlap += WEIGHT(next)*dotProduct(current[i], next);
     }
     overlap = sumInGroup(buffer, overlap);
     if (LOCAL_ID == 0)
@@ -61,7 +85,7 @@ KERNEL void makeOrthogonal(int n, int iteration, GLOBAL real4* RESTRICT basis, G
         next.y -= c*last.y;
         next.z -= c*last.z;
         basis[(iteration+1)*(mm_long) n+i] = next;
-        newSquare += dotProduct(next, next);
+        newSquare += WEIGHT(next)*dotProduct(next, next);
     }
     newSquare = sumInGroup(buffer, newSquare);
     if (LOCAL_ID == 0)
@@ -77,7 +101,7 @@ KERNEL void findOverlaps(int n, int iteration, GLOBAL const real4* RESTRICT basi
     for (int j = 0; j <= iteration; j++) {
         mixed overlap = 0;
         for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE)
-            overlap += dotProduct(basis[j*(mm_long) n+i], basis[(iteration+1)*(mm_long) n+i]);
+            overlap += WEIGHT(basis[i])*dotProduct(basis[j*(mm_long) n+i], basis[(iteration+1)*(mm_long) n+i]);
         overlap = sumInGroup(buffer, overlap);
         if (LOCAL_ID == 0)
             overlaps[j*NUM_GROUPS+GROUP_ID] = overlap;
@@ -107,23 +131,24 @@ KERNEL void removeOverlaps(int n, int iteration, GLOBAL real4* RESTRICT basis,
             next.z -= factors[j]*v.z;
         }
         basis[(iteration+1)*(mm_long) n+i] = next;
-        newSquare += dotProduct(next, next);
+        newSquare += WEIGHT(next)*dotProduct(next, next);
     }
     newSquare = sumInGroup(buffer, newSquare);
     if (LOCAL_ID == 0)
         partial[2*(iteration+1)*groups+GROUP_ID] = newSquare;
 }
 
-/** u += sum over k of coefficients[k] v_k */
+/** u += sum over k of coefficients[k] v_k, with MIXTURE D^{1/2} v_k */
 KERNEL void combineBasis(int n, int count, GLOBAL const real4* RESTRICT basis,
         GLOBAL const real* RESTRICT coefficients, GLOBAL real4* RESTRICT u) {
     for (int i = GLOBAL_ID; i < n; i += GLOBAL_SIZE) {
         real4 sum = u[i];
         for (int k = 0; k < count; k++) {
             const real4 v = basis[k*(mm_long) n+i];
-            sum.x += coefficients[k]*v.x;
-            sum.y += coefficients[k]*v.y;
-            sum.z += coefficients[k]*v.z;
+            const real c = WEIGHT(v)*coefficients[k];
+            sum.x += c*v.x;
+            sum.y += c*v.y;
+            sum.z += c*v.z;
         }
         u[i] = sum;
     }
