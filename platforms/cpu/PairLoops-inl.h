@@ -80,6 +80,25 @@ template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int3
 }
 
 /**
+ * Vectors of candidates out of many short runs, searched in one loop: how many a run has is hard to
+ * predict.
+ */
+struct VectorQueue {
+    static constexpr int ROOM = 64, MOST = 4; ///< MOST: that a run adds at once
+    int count = 0;
+    int32_t begin[ROOM], end[ROOM];
+
+    HWY_INLINE void add(int from, int to, int lanes) {
+        for (int k = 0; k < MOST; k++) { // those too many are overwritten by the next
+            begin[count + k] = from + k * lanes;
+            end[count + k] = to;
+        }
+        const int needed = (to - from + lanes - 1) / lanes;
+        count += needed < MOST ? needed : MOST;
+    }
+};
+
+/**
  * Collect the neighbours of particle i among the candidates, without a branch for each of them,
  * and the displacements from them.
  * @param range2  range2(d, j): squared ranges of pairs of i with the particles from j on
@@ -95,15 +114,17 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
     const Displacement<decltype(d)> displacement(d, g, i);
     const auto self = hn::Set(di, Index(i));
     size_t n = 0;
-    for (int r = 0; r < numRuns; r++)
-        for (int j = runs[r].begin; j < runs[r].end; j += lanes) {
+    VectorQueue queue;
+    const auto search = [&]() HWY_ATTR {
+        for (int v = 0; v < queue.count; v++) {
+            const int j = queue.begin[v];
             hn::Vec<decltype(d)> dx, dy, dz;
             displacement.of(loadCoordinates(d, g.x + j), loadCoordinates(d, g.y + j),
                             loadCoordinates(d, g.z + j), dx, dy, dz);
             const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
             const auto index = hn::Iota(di, Index(j));
             const auto candidate =
-                hn::And(hn::Lt(index, hn::Set(di, Index(runs[r].end))), hn::Ne(index, self));
+                hn::And(hn::Lt(index, hn::Set(di, Index(queue.end[v]))), hn::Ne(index, self));
             const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2(d, j))), candidate);
             const auto inRange = hn::RebindMask(d, in);
             storeIndices(di, hn::Compress(index, in), out.found + n);
@@ -112,6 +133,15 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
             hn::StoreU(hn::Compress(dz, inRange), d, out.dz + n);
             n += hn::CountTrue(di, in);
         }
+        queue.count = 0;
+    };
+    for (int r = 0; r < numRuns; r++)
+        for (int j = runs[r].begin; j < runs[r].end; j += VectorQueue::MOST * lanes) {
+            queue.add(j, runs[r].end, lanes);
+            if (queue.count > VectorQueue::ROOM - VectorQueue::MOST)
+                search();
+        }
+    search();
     return static_cast<int>(n);
 }
 
