@@ -13,6 +13,12 @@ namespace PSE::numerics {
 namespace {
 /// Of the tolerance: what T^{1/2} e_1 may err by where it need not be exact, and what it cannot be.
 constexpr double ROOT_SHARE = 0.01, FINEST_ROOT = 1e-14;
+/// A ratio of changes below this part of the last two is no sign of convergence; for so many
+/// iterations.
+constexpr double OUT_OF_LINE = 0.2;
+constexpr int DISTRUSTED = 3;
+/// So often a result may be doubted: in single precision changes never fall in line.
+constexpr int MOST_DOUBTS = 8;
 } // namespace
 
 bool LanczosTridiagonal::add(double alpha, double beta) {
@@ -23,29 +29,49 @@ bool LanczosTridiagonal::add(double alpha, double beta) {
     diagonal.push_back(alpha);
     const int n = iterations();
     double highest;
-    const Eigen::VectorXd next = root(highest);
+    Eigen::VectorXd next;
+    try {
+        next = root(highest);
+    } catch (const std::runtime_error&) {
+        // Rounding of eigenvalues shows by its root in what they add to the solution.
+        if (!kind.many || leastLeft > std::sqrt(negativeTolerance))
+            throw;
+        solution.conservativeResizeLike(Eigen::VectorXd::Zero(n));
+        return true;
+    }
     double square = next.squaredNorm();
     if (n > 1)
         square = (next.head(n - 1) - solution).squaredNorm() + next[n - 1] * next[n - 1];
     solution = next;
     const double change = std::sqrt(square / diagonal[0]);
     const bool exhausted = beta <= 1e-14 * highest;
-    if (exhausted || (n > 1 && remaining(change) <= tolerance))
+    if (kind.many && change < OUT_OF_LINE * std::max(lastRatio, earlierRatio) * lastChange)
+        distrusted = DISTRUSTED;
+    const bool near = n > 1 && remaining(change) <= tolerance;
+    if (exhausted || (near && (distrusted == 0 || doubts == MOST_DOUBTS)))
         return true;
-    if (n == kind.mostIterations) {
-        double lowest;
-        rootByEigenvalues(lowest, highest);
-        std::ostringstream message;
-        message << "the " << kind.mobility << "noise did not converge in " << n
-                << " Lanczos iterations: estimated relative error " << remaining(change)
-                << ", wanted " << tolerance << ", smallest eigenvalue " << lowest
-                << " of a largest of " << highest << "; " << kind.remedy;
-        throw std::runtime_error(message.str());
-    }
+    doubts += near;
+    if (n > 1)
+        leastLeft = std::min(leastLeft, remaining(change));
+    distrusted = std::max(0, distrusted - 1);
+    if (n == kind.mostIterations)
+        refuseUnfinished(remaining(change));
     offDiagonal.push_back(beta);
+    earlierRatio = lastRatio;
     lastRatio = (n > 1 ? change / lastChange : 0);
     lastChange = change;
     return false;
+}
+
+void LanczosTridiagonal::refuseUnfinished(double left) const {
+    double lowest, highest;
+    rootByEigenvalues(lowest, highest);
+    std::ostringstream message;
+    message << "the " << kind.mobility << "noise did not converge in " << iterations()
+            << " Lanczos iterations: estimated relative error " << left << ", wanted " << tolerance
+            << ", smallest eigenvalue " << lowest << " of a largest of " << highest << "; "
+            << kind.remedy;
+    throw std::runtime_error(message.str());
 }
 
 /** T^{1/2} e_1, and the largest eigenvalue or, where that is enough, a bound. */

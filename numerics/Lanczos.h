@@ -30,6 +30,9 @@ public:
     static constexpr LanczosKind REAL_HALF = {
         MAX_ITERATIONS, false, "real-space ",
         "loosen the tolerance or set a larger splitting parameter"};
+    /// The same to rounding, whatever was asked for.
+    static constexpr LanczosKind EXACT_REAL_HALF = {1000, false, "real-space ",
+                                                    "set a larger splitting parameter"};
     /// The mobility of chains and globules in an unbounded fluid is not.
     static constexpr LanczosKind WHOLE = {1000, true, "", "loosen the tolerance"};
 
@@ -46,7 +49,9 @@ public:
      * Add a row. The changes of M^{1/2} z from one iteration to the next fall about geometrically;
      * it is accepted once the sum of those still to come is below the tolerance, relative to
      * |M^{1/2} z|, whose exact value |z| sqrt(alpha_1) is known after the first iteration. The true
-     * error is below 2 tolerances for condition numbers up to 50, below 6 up to 1e8.
+     * error is below 2 tolerances for condition numbers up to 50, below 6 up to 1e8. Where there
+     * may be many iterations, a change that falls out of line ends nothing for three of them:
+     * eigenvalues in groups (unequal spheres at one place) are found group by group.
      * @param alpha  diagonal entry of this iteration
      * @param beta   norm of the next basis vector before normalisation (0: the Krylov space is
      * exhausted)
@@ -65,13 +70,17 @@ private:
      * changes.
      */
     double remaining(double change) const;
+    [[noreturn]] void refuseUnfinished(double left) const;
     Eigen::VectorXd root(double& highest) const;
     Eigen::VectorXd rootByEigenvalues(double& lowest, double& highest) const;
 
     double tolerance, negativeTolerance;
     LanczosKind kind;
-    double lastChange = 1, lastRatio = 0;
+    double lastChange = 1, lastRatio = 0, earlierRatio = 0;
+    int distrusted = 0; ///< iterations from here on that do not finish the process
+    int doubts = 0;     ///< how often they might have
     std::vector<double> diagonal, offDiagonal;
+    double leastLeft = 1; ///< least estimate of changes still to come
     Eigen::VectorXd solution;
 };
 

@@ -343,3 +343,40 @@ TEST(Lanczos, OfAWholeMobilityTakesAsManyIterationsAsItNeeds) {
     EXPECT_GT(iterations, LanczosTridiagonal::MAX_ITERATIONS);
     EXPECT_LE((root - exact).norm(), 6e-8 * exact.norm());
 }
+
+namespace {
+
+/** Relative error of the noise of a whole mobility; reorthogonalised, as it always is. */
+double errorOfWhole(const MatrixXd& M, double tolerance, double negativeTolerance, unsigned seed) {
+    DenseSpace space(M, LanczosTridiagonal::WHOLE.mostIterations);
+    const VectorXd z = randomVector(static_cast<int>(M.rows()), seed);
+    space.basis(0) = z;
+    const VectorXd exact = squareRoot(M) * z;
+    VectorXd root;
+    lanczosSquareRoot(space, root,
+                      LanczosTridiagonal(tolerance, negativeTolerance, LanczosTridiagonal::WHOLE),
+                      true);
+    return (root - exact).norm() / exact.norm();
+}
+
+} // namespace
+
+// Many eigenvalues, three of each, that fall fast: the process finds them group by group, and seems
+// to stand still in between.
+TEST(Lanczos, UnequalSpheresAtOnePlaceKeepTheToleranceWithinAFactor) {
+    const int n = 46;
+    const VectorXd radii = (1.386 * randomVector(n, 5).array().sin()).exp(); // from 1/4 to 4
+    MatrixXd rigid(3 * n, 3 * n), gaussian(3 * n, 3 * n);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const double larger = std::max(radii[i], radii[j]);
+            const double both = std::hypot(radii[i], radii[j]) / std::sqrt(2.0);
+            rigid.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / larger;
+            gaussian.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / both;
+        }
+    for (const MatrixXd& M : {rigid, gaussian})
+        for (double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6})
+            for (unsigned seed : {1, 2, 3})
+                EXPECT_LE(errorOfWhole(M, tolerance, 1e-12, seed), 6 * tolerance)
+                    << tolerance << " " << seed;
+}

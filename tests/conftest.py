@@ -27,6 +27,8 @@ def pytest_addoption(parser):
         help="run the tests on this platform only (may be repeated); default: all",
     )
     parser.addoption("--long", action="store_true", help="hard cases in full, not in their short form")
+    parser.addoption("--fuzz-seed", type=int, default=1, help="draws other random scenes (default: 1)")
+    parser.addoption("--fuzz-scenes", type=int, help="number of random scenes on each platform")
     parser.addoption("--torture-table", metavar="FILE", help="write the table of hard cases here")
 
 

@@ -16,6 +16,7 @@ from platformnames import contextOn
 
 ETA = 603.4
 KB = 0.00831446261815324
+ROOM_TEMPERATURE = 300.0
 # Probability with which a statistical test may fail although the library is right.
 FALSE_ALARM = 1e-6
 

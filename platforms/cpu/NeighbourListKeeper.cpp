@@ -105,6 +105,8 @@ void NeighbourListKeeper::makeList(const std::vector<OmmVec3>& positions,
 }
 
 void NeighbourListKeeper::adaptPadding() {
+    if (uses == 0)
+        return; // positions were set before any step could use it
     if (uses < FEW_USES)
         padding = std::min(padding * WIDER, openmmPadding * WIDEST);
     else if (uses > MANY_USES)

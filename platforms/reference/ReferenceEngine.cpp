@@ -177,9 +177,11 @@ void ReferenceEngine::addReal(const Vectors* forces, const Thermal* thermal, Vec
         for (size_t i = 0; i < u.size(); i++)
             particleNoise(thermal->real, indices[i], z[i].data());
         // Eigenvalues of the truncated M_R may lie below zero by the error of the truncation.
-        iterations =
-            lanczosSquareRoot(space, part, LANCZOS_TOLERANCE,
-                              std::max(2 * plan.predictedError * errorGrowth, 1e-10), true);
+        const double negative = std::max(2 * plan.predictedError * errorGrowth, 1e-10);
+        iterations = lanczosSquareRoot(
+            space, part,
+            LanczosTridiagonal(LANCZOS_TOLERANCE, negative, LanczosTridiagonal::EXACT_REAL_HALF),
+            true);
         const double scale = std::sqrt(2 * thermal->kT * selfMobility / thermal->dt);
         for (size_t i = 0; i < u.size(); i++)
             u[i] += (scales.empty() ? scale : scale * scales[i]) * part[i];

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""
+Random scenes and random calls against the Reference platform and direct sums: what must hold is in
+tests/lockstep.py, what is drawn in tests/randomscenes.py. A scene that failed once is kept by name.
+"""
+import hypothesis
+import pytest
+
+from lockstep import Lockstep, Refused
+from platformnames import familyOf
+from randomscenes import RandomScene, randomScenes
+
+# Scenes on each family of platforms; of a device each needs programs of its own.
+SHORT = {"Reference": 25, "CPU": 72}
+LONG = {"Reference": 500, "CPU": 1400}
+SHORT_DEVICE, LONG_DEVICE = 3, 40
+MOST_REFUSED = 0.2 # of all scenes
+
+# Scenes that something was wrong with.
+KEPT = {
+    "unequal Gaussian envelopes at one place": RandomScene(
+        seed=54124, count=46, model="ForceCoupling", boundary="Unbounded", phi=0.1894, places="one place",
+        kinds=0, ratio=6.817, massless=4, radius=10.36, temperature=3000.0, tolerance=6.236e-06,
+        size=0.01034, calls=(("samples", 2), ("checkpoint", 2))),
+    "unequal spheres at one place": RandomScene(
+        seed=54124, count=46, boundary="Unbounded", phi=0.1894, places="one place", kinds=0, ratio=6.8,
+        tolerance=6.236e-06, size=0.01034, calls=(("samples", 2),)),
+    "a real half that needs many iterations": RandomScene(
+        seed=25026, count=36, model="ForceCoupling", split="Prolate", phi=0.03034, edges=(1.664, 0.7475),
+        places="chain", tolerance=0.002921, size=6.019e-07, strain=0.397, calls=(("places", 43989),)),
+    "positions set between a restart and a sheared step": RandomScene(
+        seed=50334, count=51, model="FreeDraining", phi=0.001324, tilts=(1.0, 1.0, -1.0), places="droplet",
+        temperature=0.0, size=4.467e-05, repulsion=True, strain=0.241,
+        calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
+}
+
+
+def numberOfScenes(config, platformName):
+    asked = config.getoption("fuzz_scenes")
+    long = config.getoption("long")
+    return asked or (LONG if long else SHORT).get(familyOf(platformName), LONG_DEVICE if long else SHORT_DEVICE)
+
+
+def testRandomScenes(platformName, hardCase, request):
+    """
+    Random scenes (1 to 60 spheres, equal, of few or of many radii up to 1:10, volume fractions from
+    3e-4 to 3, any tilt, every model, boundary, split and shear protocol, Forces of all kinds, viscosities,
+    radii, temperatures, tolerances and steps over decades) under random calls: steps, positions, boxes,
+    settings, checkpoints, XML, new Contexts, samples, stresses, and what is to be refused.
+
+    M f within the tolerance of direct sums or of Reference, each step within the sum of both errors and
+    that of the noise; the same to the bit when steps are taken one by one or repeated; nothing but finite
+    numbers; else a refusal with a number and a remedy that leaves the state as it was.
+    """
+    refused = []
+    seed = request.config.getoption("fuzz_seed")
+    count = numberOfScenes(request.config, platformName)
+
+    @hypothesis.seed(seed)
+    @hypothesis.settings(max_examples=count, database=None, deadline=None, print_blob=False,
+                         phases=(hypothesis.Phase.generate, hypothesis.Phase.shrink),
+                         suppress_health_check=list(hypothesis.HealthCheck))
+    @hypothesis.given(randomScenes)
+    def hold(scene):
+        lockstep = Lockstep(scene, platformName)
+        try:
+            lockstep.run()
+        except Refused as refusal:
+            refused.append(refusal)
+        hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
+
+    hold()
+    hardCase.measure(seed=seed, scenes=count, refused=len(refused))
+    assert len(refused) <= MOST_REFUSED*count
+
+
+@pytest.mark.parametrize("name", KEPT)
+def testScenesThatFailedOnce(platformName, name, hardCase):
+    """
+    Random scenes in which something was wrong once.
+
+    The same, and none of them is refused.
+    """
+    lockstep = Lockstep(KEPT[name], platformName)
+    lockstep.run()
+    hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
