@@ -171,7 +171,8 @@ class RandomScene:
             pull.setForceGroup(1)
             forces.append(pull)
         if self.bonds:
-            chain = scenes.harmonicBonds([(i, i + 1) for i in range(self.count - 1)], 2*self.radii.min(), self.stiffness)
+            pairs = [(i, i + 1) for i in range(self.count - 1)]
+            chain = scenes.harmonicBonds(pairs, 2*self.radii.min(), self.stiffness)
             chain.setUsesPeriodicBoundaryConditions(self.wrapped)
             chain.setForceGroup(2)
             forces.append(chain)

@@ -3,6 +3,7 @@
 import gc
 import multiprocessing
 import os
+import re
 import signal
 import threading
 
@@ -195,6 +196,25 @@ def testXmlOfAFutureVersion(hardCase):
     message = refusalOf(openmm.XmlSerializer.deserialize,
                         text.replace('version="1"', 'version="99"'))
     assert "99" in message and "version 1" in message
+    hardCase.measure(message=message)
+
+
+def testStateOfAFutureVersion(platformName, hardCase):
+    """
+    The XML of a State whose integrator parameters have version 99.
+
+    Refused with both versions; the run goes on.
+    """
+    context, integrator = run(platformName)
+    state = context.getState(positions=True, integratorParameters=True)
+    text = openmm.XmlSerializer.serialize(state)
+    assert 'noiseStep="4"' in text
+    future = openmm.XmlSerializer.deserialize(
+        re.sub(r'(<IntegratorParameters [^>]*)version="1"', r'\1version="99"', text))
+    message = refusalOf(context.setState, future)
+    assert "version 99" in message and "version 1" in message
+    integrator.step(2)
+    assert np.all(np.isfinite(positionsOf(context)))
     hardCase.measure(message=message)
 
 

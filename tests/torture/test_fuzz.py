@@ -34,6 +34,26 @@ KEPT = {
         calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
 }
 
+ONE_PLACE = dict(seed=5, count=24, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
+# Scenes at the ends of what effects allow.
+CHOSEN = {
+    "unequal spheres at one place": RandomScene(**ONE_PLACE, kinds=3, ratio=4.0),
+    "a hundred to one at one place": RandomScene(**ONE_PLACE, kinds=2, ratio=100.0, tolerance=1e-2),
+    "Gaussian envelopes at one place": RandomScene(**ONE_PLACE, model="ForceCoupling"),
+    "unbounded, at one place": RandomScene(**ONE_PLACE, boundary="Unbounded"),
+    "unbounded Gaussian envelopes of many sizes at one place": RandomScene(
+        **ONE_PLACE, model="ForceCoupling", boundary="Unbounded", kinds=0, ratio=10.0),
+    "unbounded, a million radii apart": RandomScene(
+        seed=6, boundary="Unbounded", phi=1e-17, kinds=2, ratio=3.0, pull=2.0, calls=(("samples", 1),)),
+    "a thousand strains in a step": RandomScene(seed=7, strain=1000.3, pull=2.0, calls=(("step", 3),)),
+    "a thousand strains in a step, unequal spheres": RandomScene(
+        seed=7, strain=-1000.3, kinds=3, ratio=4.0, pull=2.0, calls=(("step", 3),)),
+    "a thousand strains in a step, unbounded": RandomScene(
+        seed=7, strain=1000.3, boundary="Unbounded", wrapped=False, pull=2.0, calls=(("step", 3),)),
+    "a trillionth of a strain in a step": RandomScene(
+        seed=8, model="ForceCoupling", strain=1e-12, repulsion=True, calls=(("step", 3), ("rate", -1.0))),
+}
+
 
 def numberOfScenes(config, platformName):
     asked = config.getoption("fuzz_scenes")
@@ -72,6 +92,19 @@ def testRandomScenes(platformName, hardCase, request):
     hold()
     hardCase.measure(seed=seed, scenes=count, refused=len(refused))
     assert len(refused) <= MOST_REFUSED*count
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def testScenesAtTheEnds(platformName, name, hardCase):
+    """
+    All spheres at one place, unequal, as Gaussian envelopes and without a boundary; a million radii
+    apart; a thousand strains in a step and a trillionth of one.
+
+    The same, and none of them is refused.
+    """
+    lockstep = Lockstep(CHOSEN[name], platformName)
+    lockstep.run()
+    hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
 
 
 @pytest.mark.parametrize("name", KEPT)
