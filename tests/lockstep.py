@@ -125,14 +125,20 @@ class Lockstep:
         made.context.setState(state)
         return made
 
+    def meetOracle(self):
+        """Outside of steps; a box that was set since the last one may need another Plan."""
+        self.meetBox()
+        self.followPlan()
+
     def followPlan(self):
         """The oracle has the same waves and the same range as the shadow."""
         plan = self.shadow.plan()
-        if self.oracle is None:
-            self.oracle = self.makeParty("Reference", plan, self.shadow.box)
-            self.oracle.context.setPositions(self.shadow.positions)
-        elif plan != self.planOfOracle:
-            self.oracle = self.remade(self.oracle, plan)
+        with refusing(): # what is chosen freely for a box that moves may not be prescribed for one
+            if self.oracle is None:
+                self.oracle = self.makeParty("Reference", plan, self.shadow.box)
+                self.oracle.context.setPositions(self.shadow.positions)
+            elif plan != self.planOfOracle:
+                self.oracle = self.remade(self.oracle, plan)
         self.planOfOracle = plan
 
     def run(self):
@@ -202,7 +208,7 @@ class Lockstep:
         found = [self.both("applyMobility", forces) for forces in kinds]
         exactly = self.exactProduct(positions, box)
         if exactly is None:
-            self.followPlan()
+            self.meetOracle()
             self.oracle.put(positions, box)
         for forces, velocities in zip(kinds, found):
             assert not np.any(velocities[~self.scene.mobile])
@@ -297,13 +303,13 @@ class Lockstep:
             party.context.setPeriodicBoxVectors(*box)
 
     def callParameter(self, value):
-        self.followPlan()
+        self.meetOracle()
         for party in self.everyContext():
             if self.scene.pull > 0:
                 party.context.setParameter("strength", value)
 
     def set(self, name, value):
-        self.followPlan()
+        self.meetOracle()
         self.settings[name] = value
         for party in self.everyContext():
             getattr(party.integrator, "set" + name)(value)
@@ -338,17 +344,24 @@ class Lockstep:
 
     def callXml(self):
         """System, integrator and State as texts: another Context made from them goes on."""
+        self.subject = self.throughXml(self.subject)
+        if self.scene.repulsion and self.platformName == "CPU":
+            # OpenMM begins a list of neighbours there, and floats are added in another order
+            self.shadow = self.throughXml(self.shadow)
+        else:
+            self.shadow.context.getState(**EVERYTHING)
+        self.meetBox()
+
+    def throughXml(self, party):
         def copied(thing):
             return openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(thing))
-        subject = self.subject
-        state = copied(subject.context.getState(**EVERYTHING))
-        self.shadow.context.getState(**EVERYTHING)
-        integrator = PSEBrownianIntegrator.cast(copied(subject.integrator))
+        state = copied(party.context.getState(**EVERYTHING))
+        integrator = PSEBrownianIntegrator.cast(copied(party.integrator))
         if (self.scene.temperature > 0) != (self.settings["Temperature"] > 0):
-            integrator.setNumericalParameters(subject.plan()) # it was made for another temperature
-        self.subject = Party(self.platformName, copied(subject.context.getSystem()), integrator)
-        self.subject.context.setState(state)
-        self.meetBox()
+            integrator.setNumericalParameters(party.plan()) # it was made for another temperature
+        made = Party(self.platformName, copied(party.context.getSystem()), integrator)
+        made.context.setState(state)
+        return made
 
     def meetBox(self):
         """Whether a box that is set next is a small change counts from the box that was used last."""
@@ -356,7 +369,7 @@ class Lockstep:
 
     def callRemake(self, tolerance, swollen):
         """Another tolerance and other radii: a new Context from the State of the old one."""
-        self.followPlan()
+        self.meetOracle()
         ratio = min(LARGEST_RATIO, self.scene.ratio*swollen) if self.scene.kinds != 1 else 1.0
         before = self.scene
         self.scene = dataclasses.replace(before, tolerance=tolerance, ratio=ratio)
@@ -379,7 +392,7 @@ class Lockstep:
 
     def callSamples(self, count):
         drawn = self.both("sampleBrownianDisplacements", count)
-        self.followPlan()
+        self.meetOracle()
         self.oracle.put(self.shadow.positions, self.shadow.box)
         expected = np.array(self.oracle.integrator.sampleBrownianDisplacements(count))
         for sample, wanted in zip(drawn, expected):
@@ -397,7 +410,7 @@ class Lockstep:
             self.refusalOf("computeStress", words=("call ", "tilt "))
             return
         groups = ~(1 << 1) & ~((1 << 2) if self.scene.wrapped else 0)
-        self.followPlan()
+        self.meetOracle()
         self.oracle.put(self.shadow.positions, self.shadow.box)
         self.oracle.context.setTime(self.shadow.context.getTime())
         with refusing():
