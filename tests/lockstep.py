@@ -415,6 +415,8 @@ class Lockstep:
         self.oracle.context.setTime(self.shadow.context.getTime())
         with refusing():
             found = self.subject.integrator.computeStress(7, groups)._value
+        if self.scene.repulsion and self.platformName == "CPU": # lists of neighbours, as in callXml()
+            self.shadow.integrator.computeStress(7, groups)
         expected = self.oracle.integrator.computeStress(7, groups)._value
         energy = self.oracle.context.getState(energy=True, groups=groups).getPotentialEnergy()._value
         volume = np.linalg.det(self.shadow.box)

@@ -34,7 +34,7 @@ KEPT = {
         calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
 }
 
-ONE_PLACE = dict(seed=5, count=24, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
+ONE_PLACE = dict(seed=5, count=20, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
 # Scenes at the ends of what effects allow.
 CHOSEN = {
     "unequal spheres at one place": RandomScene(**ONE_PLACE, kinds=3, ratio=4.0),
@@ -44,7 +44,7 @@ CHOSEN = {
     "unbounded Gaussian envelopes of many sizes at one place": RandomScene(
         **ONE_PLACE, model="ForceCoupling", boundary="Unbounded", kinds=0, ratio=10.0),
     "unbounded, a million radii apart": RandomScene(
-        seed=6, boundary="Unbounded", phi=1e-17, kinds=2, ratio=3.0, pull=2.0, calls=(("samples", 1),)),
+        seed=6, boundary="Unbounded", phi=1e-15, kinds=2, ratio=3.0, pull=2.0, calls=(("samples", 1),)),
     "a thousand strains in a step": RandomScene(seed=7, strain=1000.3, pull=2.0, calls=(("step", 3),)),
     "a thousand strains in a step, unequal spheres": RandomScene(
         seed=7, strain=-1000.3, kinds=3, ratio=4.0, pull=2.0, calls=(("step", 3),)),
