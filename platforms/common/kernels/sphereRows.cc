@@ -162,6 +162,8 @@ DEVICE real2 waveScalars(real t, int kindA, int kindB, GLOBAL const int* RESTRIC
     GLOBAL const real* RESTRICT b = weights+kindB*(mm_long) BASIS;
     GLOBAL const real* own = tables;
     real sumF = 0, sumC = 0;
+// unrolled, it takes more registers than there are
+#pragma unroll 1
     for (int p = 0; p < BASIS; p++)
         for (int q = 0; q <= p; q++) {
             const real weight = (p == q ? a[p]*b[p] : a[p]*b[q]+a[q]*b[p]);
