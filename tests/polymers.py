@@ -106,17 +106,18 @@ class Melt:
         Means and squared standard errors of what is observed, {name: (mean, variance, degrees)}, and the
         last positions (copies,N,3).
 
-        Metropolis moves of one bead after the other, in all of `copies` independent systems at once;
-        they begin as ideal chains, a fifth of the sweeps is left out, and every so many of the others
-        counts. Errors come from the spread of the copies, which are independent exactly.
+        Metropolis moves of one bead after the other, in all of `copies` independent systems at once. They
+        begin as ideal chains; twice the square of the beads of a chain, some four of its relaxation times,
+        are sweeps to forget that, and of `sweeps` after them every so many counts. Errors come from the
+        spread of the copies, which are independent exactly.
         """
         rng = np.random.default_rng(seed)
         x = self.idealChains(copies, seed + 1)
         sums, counted = dict.fromkeys(NAMES, 0.0), 0
-        for sweep in range(sweeps):
+        for sweep in range(-2*self.beads**2, sweeps):
             for i in range(self.count):
                 self.move(x, i, rng)
-            if sweep >= sweeps//5 and sweep % every == 0:
+            if sweep >= 0 and sweep % every == 0:
                 values, counted = self.observed(x), counted + 1
                 sums = {name: sums[name] + values[name] for name in NAMES}
         return {name: meanOf(sums[name]/counted) for name in NAMES}, x

@@ -30,7 +30,7 @@ def monteCarlo(melt, long):
     """Means, and configurations to start from."""
     if melt.count > 50:
         return melt.equilibrium(64, 400, 10, 741)
-    return melt.equilibrium(1000 if long else 300, 400 if long else 150, 5, 742)
+    return melt.equilibrium(1000 if long else 300, 400 if long else 120, 5, 742)
 
 
 def series(melt, start, platformName, product, steps, interval, seed):
