@@ -14,6 +14,7 @@ import concurrent.futures
 import ctypes
 import functools
 import importlib.util
+import multiprocessing
 import os
 import re
 import sys
@@ -285,8 +286,11 @@ def compileJobs(jobs):
     """Compile pairs of a program and an architecture, on all cores."""
     report = Report({}, [])
     nvrtc()  # what is missing is told here, once
-    with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        outcomes = pool.map(lambda job: compileText(job[0].text(), job[1]), jobs)
+    # Processes: within one, NVRTC compiles one program after the other.
+    with concurrent.futures.ProcessPoolExecutor(
+        len(os.sched_getaffinity(0)), multiprocessing.get_context("spawn")
+    ) as pool:
+        outcomes = pool.map(compileText, *zip(*[(program.text(), a) for program, a in jobs]))
         for (program, architecture), (succeeded, log) in zip(jobs, outcomes):
             if not succeeded:
                 report.errors.append(
