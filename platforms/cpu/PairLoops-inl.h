@@ -31,11 +31,12 @@ template <class D> class Displacement {
 public:
     using Real = hn::TFromD<D>;
     using V = hn::Vec<D>;
-    HWY_INLINE Displacement(D d, const PairGeometry<Real>& g, int i) : d(d), g(g), i(i) {}
+    HWY_INLINE Displacement(D d, const PairGeometry<Real>& g, int i)
+        : d(d), g(g), ownX(g.x[i]), ownY(g.y[i]), ownZ(g.z[i]) {}
 
     template <class Coordinate>
     HWY_INLINE void of(Coordinate x, Coordinate y, Coordinate z, V& dx, V& dy, V& dz) const {
-        const V sx = difference(g.x[i], x), sy = difference(g.y[i], y), sz = difference(g.z[i], z);
+        const V sx = difference(ownX, x), sy = difference(ownY, y), sz = difference(ownZ, z);
         dx = hn::MulAdd(constant(g.box[0]), sx,
                         hn::MulAdd(constant(g.box[1]), sy, hn::Mul(constant(g.box[3]), sz)));
         dy = hn::MulAdd(constant(g.box[2]), sy, hn::Mul(constant(g.box[4]), sz));
@@ -62,8 +63,9 @@ private:
     }
 
     D d;
-    const PairGeometry<Real>& g;
-    int i;
+    const PairGeometry<Real>
+        g; // a copy: what loops store cannot change it, so it stays in registers
+    const typename PairCoordinate<Real>::Type ownX, ownY, ownZ;
 };
 
 /** Indices in numbers as wide as a Real: integers, or reals where those have 53 bits. */
@@ -76,6 +78,27 @@ template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int3
     else {
         const hn::Rebind<int32_t, DI> narrow;
         hn::StoreU(hn::DemoteTo(narrow, indices), narrow, to);
+    }
+}
+
+/** Append to `out` from its place n on those of the particles from j on that are in range. */
+template <class D, class Mask, class Index>
+HWY_INLINE void storeChosen(D d, Mask in, Index j, hn::Vec<D> dx, hn::Vec<D> dy, hn::Vec<D> dz,
+                            const PairScratch<hn::TFromD<D>>& out, size_t n) {
+    const IndexTag<D> di;
+    if constexpr (sizeof(Index) == 4) { // one compression, which many processors do by a long table
+        const auto lanes = hn::Compress(hn::Iota(di, 0), in);
+        const auto order = hn::IndicesFromVec(d, lanes);
+        storeIndices(di, hn::Add(lanes, hn::Set(di, j)), out.found + n);
+        hn::StoreU(hn::TableLookupLanes(dx, order), d, out.dx + n);
+        hn::StoreU(hn::TableLookupLanes(dy, order), d, out.dy + n);
+        hn::StoreU(hn::TableLookupLanes(dz, order), d, out.dz + n);
+    } else {
+        const auto inRange = hn::RebindMask(d, in);
+        storeIndices(di, hn::Compress(hn::Iota(di, j), in), out.found + n);
+        hn::StoreU(hn::Compress(dx, inRange), d, out.dx + n);
+        hn::StoreU(hn::Compress(dy, inRange), d, out.dy + n);
+        hn::StoreU(hn::Compress(dz, inRange), d, out.dz + n);
     }
 }
 
@@ -126,11 +149,7 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
             const auto candidate =
                 hn::And(hn::Lt(index, hn::Set(di, Index(queue.end[v]))), hn::Ne(index, self));
             const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2(d, j))), candidate);
-            const auto inRange = hn::RebindMask(d, in);
-            storeIndices(di, hn::Compress(index, in), out.found + n);
-            hn::StoreU(hn::Compress(dx, inRange), d, out.dx + n);
-            hn::StoreU(hn::Compress(dy, inRange), d, out.dy + n);
-            hn::StoreU(hn::Compress(dz, inRange), d, out.dz + n);
+            storeChosen(d, in, Index(j), dx, dy, dz, out, n);
             n += hn::CountTrue(di, in);
         }
         queue.count = 0;
