@@ -85,21 +85,18 @@ template <class DI> HWY_INLINE void storeIndices(DI d, hn::Vec<DI> indices, int3
 template <class D, class Mask, class Index>
 HWY_INLINE void storeChosen(D d, Mask in, Index j, hn::Vec<D> dx, hn::Vec<D> dy, hn::Vec<D> dz,
                             const PairScratch<hn::TFromD<D>>& out, size_t n) {
+    // One compression: many processors have none, and Highway's takes a long table then.
     const IndexTag<D> di;
-    if constexpr (sizeof(Index) == 4) { // one compression, which many processors do by a long table
-        const auto lanes = hn::Compress(hn::Iota(di, 0), in);
-        const auto order = hn::IndicesFromVec(d, lanes);
+    const hn::RebindToSigned<D> integers;
+    const auto lanes = hn::Compress(hn::Iota(integers, 0), hn::RebindMask(integers, in));
+    const auto order = hn::IndicesFromVec(d, lanes);
+    if constexpr (sizeof(Index) == 4)
         storeIndices(di, hn::Add(lanes, hn::Set(di, j)), out.found + n);
-        hn::StoreU(hn::TableLookupLanes(dx, order), d, out.dx + n);
-        hn::StoreU(hn::TableLookupLanes(dy, order), d, out.dy + n);
-        hn::StoreU(hn::TableLookupLanes(dz, order), d, out.dz + n);
-    } else {
-        const auto inRange = hn::RebindMask(d, in);
-        storeIndices(di, hn::Compress(hn::Iota(di, j), in), out.found + n);
-        hn::StoreU(hn::Compress(dx, inRange), d, out.dx + n);
-        hn::StoreU(hn::Compress(dy, inRange), d, out.dy + n);
-        hn::StoreU(hn::Compress(dz, inRange), d, out.dz + n);
-    }
+    else
+        storeIndices(di, hn::TableLookupLanes(hn::Iota(di, j), order), out.found + n);
+    hn::StoreU(hn::TableLookupLanes(dx, order), d, out.dx + n);
+    hn::StoreU(hn::TableLookupLanes(dy, order), d, out.dy + n);
+    hn::StoreU(hn::TableLookupLanes(dz, order), d, out.dz + n);
 }
 
 /**
