@@ -63,8 +63,7 @@ private:
     }
 
     D d;
-    const PairGeometry<Real>
-        g; // a copy: what loops store cannot change it, so it stays in registers
+    const PairGeometry<Real> g; // a copy, in registers: what loops store cannot change it
     const typename PairCoordinate<Real>::Type ownX, ownY, ownZ;
 };
 

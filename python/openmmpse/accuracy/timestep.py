@@ -46,7 +46,8 @@ def recommendStep(source, positions=None, integrator=None, *, box=None, platform
     radii of gyration are; 2/w is the limit of stability. w is the largest eigenvalue of M K, M the mobility and K the
     derivatives of the forces, by Lanczos's method with K in central differences. Of `configurations` along a short run
     (which begins at the positions given, with steps as found so far) the largest counts, because curvature varies where
-    forces are steep; where the box moves, only the first. Relax the scene first: an overlap that equilibrium does not have makes the steps short.
+    forces are steep; where the box moves, only the first. Relax the scene first: an overlap that equilibrium does not
+    have makes the steps shorter than need be.
 
     Where no forces limit it, or softer ones than the fluid, the step is that of an rms displacement of 0.3 radii, in
     which the mobility changes.
@@ -72,11 +73,10 @@ def advise(scene, bias=BIAS, configurations=CONFIGURATIONS):
             if positions is None:  # they belong to another box than the scene
                 break
     present = scene.stepSize
+    step, reason = _step(scene, rate, bias)
     if rate == 0:
-        step, reason = _step(scene, rate, bias)
         return StepAdvice(None, None, present, None, bias, step, reason)
     share = rate * present / 2
-    step, reason = _step(scene, rate, bias)
     return StepAdvice(rate, 2 / rate, present, share / (1 - share) if share < 1 else np.inf, bias, step, reason)
 
 
