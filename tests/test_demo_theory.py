@@ -9,11 +9,11 @@ import pytest
 from openmm import app
 
 from openmmpse import demo
-from openmmpse.demo import network, polymer, protocol, report, statistics, structure, theory
+from openmmpse.analysis import beads, estimate, finiteSizeCorrection
+from openmmpse.demo import network, protocol, report, statistics, structure, theory
 
-UNIT = {"radius": 1.0, "viscosity": 1.0 / (6 * math.pi), "kT": 1.0}  # D0 = 1
-WATER = 1.002 * theory.MPA_S
-KT = theory.thermal_energy(293.15)
+WATER = 1.002 * beads.MPA_S
+KT = beads.thermalEnergy(293.15)
 
 
 def load_protein():
@@ -28,89 +28,19 @@ def test_units():
     assert KT == pytest.approx(1.380649e-23 * 6.02214076e23 * 293.15 / 1000, rel=1e-12)
 
 
-def pair_scalars(distance):
-    """Mobility of two unit spheres on the x axis in units of 1/(6 pi eta a): along and across the pair."""
-    matrix = theory.rpy_mobility(np.array([[0.0, 0, 0], [distance, 0, 0]]), 1.0, UNIT["viscosity"])
-    assert np.allclose(matrix, matrix.T, atol=1e-15)
-    return matrix[0, 3], matrix[1, 4]
-
-
-@pytest.mark.parametrize(
-    "distance, along, across", [(2.0, 0.625, 0.4375), (0.5, 0.90625, 0.859375), (0.0, 1.0, 1.0)]
-)
-def test_pair_mobility(distance, along, across):
-    assert pair_scalars(distance) == pytest.approx((along, across), abs=1e-14)
-
-
-def test_mobility_joins_at_contact():
-    assert pair_scalars(2.0 - 1e-9) == pytest.approx(pair_scalars(2.0), abs=1e-8)
-
-
-def test_doublet_translates_as_the_reference_says():
-    doublet = np.array([[0.0, 0, 0], [0, 0, 2.0]])
-    mean = (0.8125 + 2 * 0.71875) / 3
-    assert theory.kirkwood(doublet, **UNIT) == pytest.approx(mean, abs=1e-14)
-    assert theory.frozen_bound(doublet, **UNIT) == pytest.approx(mean, abs=1e-14)
-
-
-def test_kirkwood_is_the_trace_of_the_dense_mobility():
-    positions = np.random.default_rng(3).normal(scale=2.0, size=(12, 3))
-    dense = theory.rpy_mobility(positions, 1.0, UNIT["viscosity"]).reshape(12, 3, 12, 3)
-    assert theory.kirkwood(positions, **UNIT) == pytest.approx(np.einsum("iaja->", dense) / 3 / 144, rel=1e-13)
-
-
-def test_rigid_body_is_minimal_at_its_centre_and_the_same_from_any_origin():
-    positions = np.random.default_rng(4).normal(scale=2.0, size=(10, 3)) * [1, 1, 3]
-    translation, rotation = theory.rigid_body(positions, **UNIT)
-    moved = theory.rigid_body(positions + [5.0, -7.0, 2.0], **UNIT)
-    assert moved == pytest.approx((translation, rotation), rel=1e-10)
-    assert theory.frozen_bound(positions, **UNIT) < translation < theory.kirkwood(positions, **UNIT)
-
-
-@pytest.mark.parametrize(
-    "count, bond, expected",
-    [
-        (2, 2, 0.779432),
-        (10, 2, 0.441176),
-        (10, 4, 0.285586),
-        (50, 4, 0.128453),
-        (100, 2, 0.167527),
-        (100, 4, 0.091133),
-        (1000, 4, 0.029022),
-    ],
-)
-def test_gaussian_chain(count, bond, expected):
-    assert theory.gaussian_chain_kirkwood(count, bond, **UNIT) == pytest.approx(expected, abs=6e-7)
-
-
-def test_gaussian_chain_is_the_average_over_drawn_chains():
-    generator = np.random.default_rng(11)
-    drawn = [theory.kirkwood(polymer.equilibrium(generator, 20, 2.0), **UNIT) for _ in range(400)]
-    sampled = statistics.estimate(drawn)
-    # False alarm rate 1e-6.
-    assert sampled.deviation(theory.gaussian_chain_kirkwood(20, 2.0, **UNIT)) < 4.9
-    assert sampled.error < 0.01 * sampled.value
-
-
-def test_finite_size_of_one_sphere():
-    assert 1.0 - theory.finite_size_correction(20.0, UNIT["viscosity"], 1.0, radius=1.0) == pytest.approx(
-        0.85865872, abs=1e-8
-    )
-
-
 def test_lysozyme():
     """The issue's numbers for its 162 beads: 1.28e-10 and 1.06e-10 m^2/s, 2.7e-12 without hydrodynamics."""
     protein = load_protein()
     assert protein.positions.shape == (162, 3)
-    beads = (protein.positions, 0.484, WATER, KT)
-    kirkwood, (rigid, rotation) = theory.kirkwood(*beads), theory.rigid_body(*beads)
-    free = theory.free_draining(162, 0.484, WATER, KT)
-    assert kirkwood * theory.M2_PER_S == pytest.approx(1.2775e-10, abs=1e-14)
-    assert rigid * theory.M2_PER_S == pytest.approx(1.0554e-10, abs=1e-14)
-    assert free * theory.M2_PER_S == pytest.approx(2.733e-12, abs=1e-15)
+    shape = (protein.positions, 0.484, WATER, KT)
+    kirkwood, (rigid, rotation) = beads.kirkwood(*shape), beads.rigidBody(*shape)
+    free = beads.freeDraining(162, 0.484, WATER, KT)
+    assert kirkwood * beads.M2_PER_S == pytest.approx(1.2775e-10, abs=1e-14)
+    assert rigid * beads.M2_PER_S == pytest.approx(1.0554e-10, abs=1e-14)
+    assert free * beads.M2_PER_S == pytest.approx(2.733e-12, abs=1e-15)
     assert (round(kirkwood / free), round(rigid / free)) == (47, 39)
     assert rotation * 1e12 == pytest.approx(1.84e7, rel=1e-2)
-    correction = theory.finite_size_correction(20.0, WATER, KT, theory.radius_of_gyration(protein.positions), 0.484)
+    correction = finiteSizeCorrection(20.0, WATER, KT, 0.484, beads.radiusOfGyration(protein.positions))
     assert correction / rigid == pytest.approx(0.284, abs=0.005)
 
     springs = network.connect(protein.positions)
@@ -177,17 +107,6 @@ def test_one_step_diffusion():
     )
     assert measured.deviation(0.7) < 5.8  # false alarm rate 1e-6 (Student's distribution, 40 groups)
     assert measured.error == pytest.approx(0.7 * math.sqrt(2 / 12000), rel=0.4)
-
-
-def test_estimates():
-    assert statistics.estimate([1.0, 2.0, 3.0]) == pytest.approx((2.0, 1 / math.sqrt(3)))
-    assert statistics.Estimate(2.0, 0.5).deviation((0.0, 1.0)) == 2.0
-    assert statistics.Estimate(2.0, 0.5).deviation((1.5, 3.0)) == 0.0
-    assert statistics.Estimate(2.0, 0.3).minus(statistics.Estimate(1.0, 0.4)) == pytest.approx((1.0, 0.5))
-    with pytest.raises(ValueError, match="at least 2 blocks"):
-        statistics.estimate([1.0])
-    with pytest.raises(ValueError, match="lag 30"):
-        statistics.displacement_diffusion([np.zeros((40, 3))], 1.0, [30], 2)
 
 
 def test_effects_are_read_from_the_description():

@@ -4,6 +4,7 @@
 PSEBrownianIntegrator takes the place of openmm.BrownianIntegrator: see its documentation.
 `python -m openmmpse doctor` checks an installation, `python -m openmmpse demo` shows what it does, and
 `python -m openmmpse accuracy` (in Python: accuracy.measure) tells what accuracy costs for a scene of one's own.
+`openmmpse.analysis` makes diffusion and viscosity of trajectories, with error bars.
 """
 
 from importlib.metadata import version as _version
@@ -26,5 +27,6 @@ PSEBrownianIntegrator.__module__ = __name__
 _loadMissing()
 
 from openmmpse import accuracy as accuracy  # noqa: E402  (needs the integrator above)
+from openmmpse import analysis as analysis  # noqa: E402
 
 __all__ = ["PSEBrownianIntegrator"]

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from openmmpse.analysis import Curve, Estimate, beads, estimate
+
 from . import network, polymer, simulate, statistics, theory
-from .results import Curve, Result, Row
+from .results import Result, Row
 from .simulate import THERMAL_ENERGY as kT
 from .simulate import VISCOSITY, to_infinite
 from .trajectories import (
@@ -61,22 +63,22 @@ def protein(structure, sampling, platform, team, folder):
 
 def _protein_result(wet, dry, sampling, molecule, x0, linear, facts):
     """`Result` of the protein's replicas with (wet) and without (dry) hydrodynamics."""
-    beads = (RESIDUE_RADIUS, VISCOSITY, kT)
+    fluid = (RESIDUE_RADIUS, VISCOSITY, kT)
     snapshots = [x for replica in wet for x in replica.snapshots]
-    kirkwood = float(np.mean([theory.kirkwood(x, *beads) for x in snapshots]))
-    rigid = float(np.mean([theory.rigid_body(x, *beads)[0] for x in snapshots]))
-    correction = to_infinite(molecule, theory.radius_of_gyration(x0))
-    short = statistics.estimate([value for replica in wet for value in replica.exact])
+    kirkwood = float(np.mean([beads.kirkwood(x, *fluid) for x in snapshots]))
+    rigid = float(np.mean([beads.rigidBody(x, *fluid)[0] for x in snapshots]))
+    correction = to_infinite(molecule, beads.radiusOfGyration(x0))
+    short = estimate([value for replica in wet for value in replica.exact])
     moments = [displacements for replica in wet for displacements in replica.moments]
     one_step = statistics.one_step_diffusion(moments, molecule.step).shifted(correction)
     # Theory and simulation see the same configurations here, so the tolerance is all that may separate them.
-    exact = statistics.Estimate(short.value, simulate.TOLERANCE * short.value).shifted(correction)
+    exact = Estimate(short.value, simulate.TOLERANCE * short.value).shifted(correction)
     long, curves, plain = long_time_rows(
         "protein", wet, sampling, molecule.step, correction, short, rigid, "rigid body, dense")
-    free = theory.free_draining(len(x0), *beads)
+    free = beads.freeDraining(len(x0), *fluid)
     # The same snapshots without a box: what the finite-size correction must lead to.
-    infinite = statistics.estimate([value for replica in wet for value in replica.unbounded[0]])
-    infinite = statistics.Estimate(infinite.value, simulate.TOLERANCE * infinite.value)
+    infinite = estimate([value for replica in wet for value in replica.unbounded[0]])
+    infinite = Estimate(infinite.value, simulate.TOLERANCE * infinite.value)
     steps = [displacements for replica in wet for displacements in replica.unbounded[1]]
     rows = [
         Row("protein", True, "short", ONE_STEP, one_step, kirkwood, "Kirkwood, dense"),
@@ -107,8 +109,8 @@ def chain(plan, platform, team, folder):
     ]
 
     def evaluate():
-        beads = (polymer.RADIUS, VISCOSITY, kT)
-        frozen = float(np.mean([theory.frozen_bound(x, *beads) for x in conformations[:FROZEN_CHAINS]]))
+        fluid = (polymer.RADIUS, VISCOSITY, kT)
+        frozen = float(np.mean([beads.frozenBound(x, *fluid) for x in conformations[:FROZEN_CHAINS]]))
         (wet, dry), measured = (team.collect(futures) for futures in runs), team.collect(parts)
         facts = [
             f"ideal chain of {polymer.COUNT} beads, bond {polymer.BOND:.1f} nm, radius of gyration "
@@ -124,15 +126,15 @@ def chain(plan, platform, team, folder):
 
 def _polymer_result(wet, dry, measured, sampling, molecule, frozen, facts, positions):
     """`Result` of the polymer's replicas and of its independent conformations (measured); frozen: lower bound of D."""
-    beads = (polymer.RADIUS, VISCOSITY, kT)
-    kirkwood = theory.gaussian_chain_kirkwood(polymer.COUNT, polymer.BOND, *beads)
+    fluid = (polymer.RADIUS, VISCOSITY, kT)
+    kirkwood = beads.gaussianChainKirkwood(polymer.COUNT, polymer.BOND, *fluid)
     correction = to_infinite(molecule, polymer.GYRATION)
-    short = statistics.estimate([value for exact, _ in measured for value in exact])
+    short = estimate([value for exact, _ in measured for value in exact])
     moments = [displacements for _, part in measured for displacements in part]
     one_step = statistics.one_step_diffusion(moments, molecule.step).shifted(correction)
     long, curves, plain = long_time_rows(
         "polymer", wet, sampling, molecule.step, correction, short, (frozen, kirkwood), "frozen to Kirkwood")
-    rouse = theory.free_draining(polymer.COUNT, *beads)
+    rouse = beads.freeDraining(polymer.COUNT, *fluid)
     rows = [
         Row("polymer", True, "short", ONE_STEP, one_step, kirkwood, "Kirkwood, ensemble"),
         Row("polymer", True, "short", FORCE, short.shifted(correction), kirkwood, "Kirkwood, ensemble"),
@@ -157,7 +159,7 @@ def _submit(team, molecule, sampling, starts, seed, platform, trajectory):
 
 
 def _plain_fact(plain):
-    value, error = (x * theory.M2_PER_S * 1e10 for x in plain)
+    value, error = (x * beads.M2_PER_S * 1e10 for x in plain)
     return f"long-time displacements alone, without the control variate: {value:.3f} +- {error:.3f} e-10 m^2/s"
 
 

@@ -9,7 +9,8 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first
 import numpy as np  # noqa: E402
 from matplotlib.collections import EllipseCollection  # noqa: E402
 
-from . import theory  # noqa: E402
+from openmmpse.analysis import beads  # noqa: E402
+
 from .trajectories import DISPLACEMENT, DRIFT, FORCE, FREE_FORCE, ONE_STEP  # noqa: E402
 
 # Okabe and Ito's palette: told apart with any colour vision, and in grey.
@@ -36,7 +37,7 @@ def draw(protein, polymer, path):
 
 
 def _si(value):
-    return np.asarray(value) * theory.M2_PER_S
+    return np.asarray(value) * beads.M2_PER_S
 
 
 def _molecules(axes, protein, polymer):

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import openmm
 
+from openmmpse.analysis import beads
+
 from . import theory
 
 CUTOFF = 1.5  #: nm; with it the slowest mode is 72 times slower than the fastest one (no cut-off: 190 times)
@@ -89,7 +91,7 @@ class Relaxation(NamedTuple):
 def relax(network, positions, radius, viscosity, kT):
     """`Relaxation` of a network at rest, from the dense Rotne-Prager-Yamakawa mobility."""
     springs = stiffness(network, positions)
-    mobility = theory.rpy_mobility(positions, radius, viscosity)
+    mobility = beads.mobilityMatrix(positions, radius, viscosity)
     rates, weights = theory.harmonic_modes(mobility, springs, kT)
     values = np.linalg.eigvalsh(springs)
     fluctuation = math.sqrt(kT * (1.0 / values[6:]).sum() / len(positions))

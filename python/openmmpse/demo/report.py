@@ -7,7 +7,9 @@ import csv
 import time
 from typing import NamedTuple
 
-from . import simulate, theory
+from openmmpse.analysis import beads
+
+from . import simulate
 from .results import AGREEMENT
 from .simulate import Solvent
 from .trajectories import DRIFT, FORCE
@@ -64,7 +66,7 @@ def write_csv(results, path):
                          "theory_low_m2_per_s", "theory_high_m2_per_s", "theory", "distance_in_standard_errors"])
         for result in results:
             for row in result.rows:
-                numbers = [f"{x * theory.M2_PER_S:.6e}" for x in (*row.measured, *_interval(row))]
+                numbers = [f"{x * beads.M2_PER_S:.6e}" for x in (*row.measured, *_interval(row))]
                 writer.writerow([row.molecule, "on" if row.hydrodynamics else "off", row.times, row.method, *numbers,
                                  row.theory, f"{row.deviation:.2f}"])
 
@@ -126,9 +128,9 @@ def _measured(row):
 
 def _number(value, decimals=None):
     """nm^2/ps in 1e-10 m^2/s."""
-    return f"{value * theory.M2_PER_S * 1e10:.{_decimals(value) if decimals is None else decimals}f}"
+    return f"{value * beads.M2_PER_S * 1e10:.{_decimals(value) if decimals is None else decimals}f}"
 
 
 def _decimals(value):
     """Of a number in 1e-10 m^2/s: one more below 0.1."""
-    return 4 if abs(value * theory.M2_PER_S * 1e10) < 0.1 else 3
+    return 4 if abs(value * beads.M2_PER_S * 1e10) < 0.1 else 3

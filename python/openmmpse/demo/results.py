@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .statistics import Estimate
+from openmmpse.analysis import Estimate
 
 AGREEMENT = 3.0  #: standard errors that count as agreement
 
@@ -30,14 +30,6 @@ class Row(NamedTuple):
     @property
     def agrees(self):
         return self.deviation <= AGREEMENT
-
-
-class Curve(NamedTuple):
-    """A quantity against time (ps) with standard errors (None: exact)."""
-
-    times: np.ndarray
-    values: np.ndarray
-    errors: np.ndarray | None
 
 
 class Result(NamedTuple):

@@ -13,13 +13,13 @@ import openmm
 from openmm import app, unit
 
 import openmmpse
+from openmmpse.analysis import beads, finiteSizeCorrection, shortTimeDiffusion
 
-from . import theory
 from .parallel import add_progress
 
 TEMPERATURE = 293.15  #: K
-VISCOSITY = 1.002 * theory.MPA_S  #: water at 20 C, Da/(nm ps)
-THERMAL_ENERGY = theory.thermal_energy(TEMPERATURE)
+VISCOSITY = 1.002 * beads.MPA_S  #: water at 20 C, Da/(nm ps)
+THERMAL_ENERGY = beads.thermalEnergy(TEMPERATURE)
 TOLERANCE = 1e-3
 FORCE_UNIT = unit.kilojoule_per_mole / unit.nanometer
 
@@ -97,18 +97,8 @@ class Solvent:
         self.simulation.reporters.clear()
 
     def short_time_diffusion(self):
-        """Exact short-time diffusion coefficient of the centre of mass at the present positions, in this fluid, nm^2/ps.
-
-        A unit force spread evenly over the beads moves their mean by tr(sum_ij M_ij)/(3 N^2), averaged over three
-        directions.
-        """
-        count = self.molecule.count
-        total = 0.0
-        for axis in range(3):
-            force = np.zeros((count, 3))
-            force[:, axis] = 1.0 / count
-            total += np.mean(np.asarray(self.integrator.applyMobility(force))[:, axis])
-        return THERMAL_ENERGY * total / 3
+        """Exact short-time diffusion coefficient of the centre of mass at the present positions, in this fluid, nm^2/ps."""
+        return shortTimeDiffusion(self.simulation.context)
 
     def one_step_displacements(self, samples):
         """(samples, 3): displacement of the centre of mass in one step at the present positions, without forces, nm."""
@@ -117,7 +107,7 @@ class Solvent:
 
 def to_infinite(molecule, gyration):
     """What to add to a diffusion coefficient measured in the molecule's box with hydrodynamics, nm^2/ps."""
-    return theory.finite_size_correction(molecule.edge, VISCOSITY, THERMAL_ENERGY, gyration, molecule.radius)
+    return finiteSizeCorrection(molecule.edge, VISCOSITY, THERMAL_ENERGY, molecule.radius, gyration)
 
 
 def _plain(quantity, expected_unit):

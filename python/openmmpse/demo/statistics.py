@@ -8,65 +8,14 @@ Lengths in nm, times in ps, diffusion coefficients in nm^2/ps.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
+
+from openmmpse.analysis.displacements import meanSquares
+from openmmpse.analysis.estimates import blocksOf, estimate, meanOfBlocks
 
 CONTROL = (
     0.75  #: share of the noise's chance deviation taken off; best is (long-time over short-time D)^2, 0.7-0.9 here
 )
-
-
-class Estimate(NamedTuple):
-    """A measured number and its standard error, same unit."""
-
-    value: float
-    error: float
-
-    def scaled(self, factor):
-        return Estimate(self.value * factor, self.error * abs(factor))
-
-    def shifted(self, constant):
-        return Estimate(self.value + constant, self.error)
-
-    def minus(self, other):
-        """Difference of two independent estimates."""
-        return Estimate(self.value - other.value, math.hypot(self.error, other.error))
-
-    def deviation(self, expected):
-        """Distance from an expected number, or from the nearer end of an interval (low, high), in standard errors."""
-        low, high = expected if isinstance(expected, tuple) else (expected, expected)
-        distance = max(low - self.value, self.value - high, 0.0)
-        if distance == 0.0:
-            return 0.0
-        return distance / self.error if self.error > 0 else math.inf
-
-
-def mean_of_blocks(blocks):
-    """Mean and standard error over the first axis of (blocks, ...); at least two blocks."""
-    blocks = np.asarray(blocks, dtype=float)
-    if len(blocks) < 2:
-        raise ValueError(f"an error bar needs at least 2 blocks, not {len(blocks)}")
-    return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / math.sqrt(len(blocks))
-
-
-def estimate(blocks):
-    """Estimate from independent numbers, one per block."""
-    mean, error = mean_of_blocks(blocks)
-    return Estimate(float(mean), float(error))
-
-
-def split(paths, count):
-    """Cut each path, an array (samples, ...), into `count` equal blocks (the odd rest at its start is left out)."""
-    blocks = []
-    for path in paths:
-        length = len(path) // count
-        if length < 1:
-            raise ValueError(f"a path of {len(path)} samples cannot be cut into {count} blocks")
-        start = len(path) - count * length
-        blocks += [path[start + i * length : start + (i + 1) * length] for i in range(count)]
-    return blocks
 
 
 def displacement_diffusion(paths, interval, lags, blocks_per_path, noise=None, noise_diffusion=0.0):
@@ -77,17 +26,12 @@ def displacement_diffusion(paths, interval, lags, blocks_per_path, noise=None, n
     Most of the chance in a displacement is chance in its noise: the share CONTROL of what the noise shows beyond its
     known mean is taken off. A constant share keeps the estimate unbiased (a control variate); it halves the error bar.
     """
-    rows = []
-    noises = split(noise, blocks_per_path) if noise is not None else None
-    for index, block in enumerate(split(paths, blocks_per_path)):
-        if max(lags) >= len(block):
-            raise ValueError(f"lag {max(lags)} does not fit in a block of {len(block)} samples")
-        row = np.array([_mean_square(block, lag) / (6 * lag * interval) for lag in lags])
-        if noises is not None:
-            shown = [_mean_square(noises[index], lag) / (6 * lag * interval) for lag in lags]
-            row -= CONTROL * (np.array(shown) - noise_diffusion)
-        rows.append(row)
-    return mean_of_blocks(rows)
+    times = 6 * interval * np.asarray(lags)
+    rows = np.array([meanSquares(block, lags) / times for block in blocksOf(paths, blocks_per_path, max(lags))])
+    if noise is not None:
+        shown = [meanSquares(block, lags) / times for block in blocksOf(noise, blocks_per_path, max(lags))]
+        rows -= CONTROL * (np.array(shown) - noise_diffusion)
+    return meanOfBlocks(rows)
 
 
 def noise_paths(paths, drifts, step):
@@ -111,8 +55,8 @@ def drift_integral(drifts, step, longest, blocks_per_path):
     and D(long) the trapezoidal rule. Returns (times, (mean, error) of D(0) - D(t), (mean, error) of the second
     integral), for t = 1 .. longest steps.
     """
-    rows = [_integrals(block, step, longest) for block in split(drifts, blocks_per_path)]
-    mean, error = mean_of_blocks(rows)
+    rows = [_integrals(block, step, longest) for block in blocksOf(drifts, blocks_per_path, longest)]
+    mean, error = meanOfBlocks(rows)
     return step * np.arange(1, longest + 1), (mean[0], error[0]), (mean[1], error[1])
 
 
@@ -126,14 +70,8 @@ def one_step_diffusion(groups, step):
     return estimate((groups**2).sum(axis=-1).mean(axis=-1) / (6 * step))
 
 
-def _mean_square(path, lag):
-    return float(((path[lag:] - path[:-lag]) ** 2).sum(axis=-1).mean())
-
-
 def _integrals(drift, step, longest):
     """D(0) - D(t) and the integral of C from 0 to t, for t = 1 .. longest steps: see `drift_integral`."""
-    if longest >= len(drift):
-        raise ValueError(f"correlations over {longest} samples do not fit in a block of {len(drift)}")
     correlation = np.array(
         [(drift[k:] * drift[: len(drift) - k]).sum(axis=1).mean() / 3 for k in range(longest + 1)]
     )

@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from openmm import app
 
+from openmmpse.analysis import Curve, Estimate, spacedLags
+
 from . import protocol, statistics
 from .parallel import add_progress
-from .results import Curve, Row
+from .results import Row
 from .simulate import Recorder, Solvent
 
 ONE_STEP, FORCE = "one-step displacements", "velocity under a force"
@@ -84,15 +86,15 @@ def long_time_rows(name, replicas, sampling, step, correction, short, expected, 
 
     short: Estimate of the short-time value in the box; correction: to infinite solvent, nm^2/ps.
     """
-    lags = _lags(sampling.lag)
+    lags = spacedLags(sampling.lag)
     centres, drifts = [replica.centres for replica in replicas], [replica.drifts for replica in replicas]
     plain, spread = statistics.displacement_diffusion(centres, step, lags, sampling.blocks)
     noise = statistics.noise_paths(centres, drifts, step)
     mean, error = statistics.displacement_diffusion(centres, step, lags, sampling.blocks, noise, short.value)
     error = np.hypot(error, statistics.CONTROL * short.error)
     times, apparent, total = statistics.drift_integral(drifts, step, sampling.lag, sampling.blocks)
-    direct = statistics.Estimate(float(mean[-1]), float(error[-1])).shifted(correction)
-    sharp = short.minus(statistics.Estimate(float(total[0][-1]), float(total[1][-1]))).shifted(correction)
+    direct = Estimate(float(mean[-1]), float(error[-1])).shifted(correction)
+    sharp = short.minus(Estimate(float(total[0][-1]), float(total[1][-1]))).shifted(correction)
     rows = [
         Row(name, True, "long", DISPLACEMENT, direct, expected, label),
         Row(name, True, "long", DRIFT, sharp, expected, label),
@@ -101,28 +103,22 @@ def long_time_rows(name, replicas, sampling, step, correction, short, expected, 
         "displacements": Curve(np.array(lags) * step, mean + correction, error),
         "drift": Curve(times, short.value + correction - apparent[0], np.hypot(short.error, apparent[1])),
     }
-    return rows, curves, statistics.Estimate(float(plain[-1]), float(spread[-1])).shifted(correction)
+    return rows, curves, Estimate(float(plain[-1]), float(spread[-1])).shifted(correction)
 
 
 def free_rows(name, replicas, sampling, step, expected, label, curves):
     """Rows without hydrodynamics; adds their curve to `curves`."""
-    lags = _lags(sampling.lag // FREE_INTERVAL)
+    lags = spacedLags(sampling.lag // FREE_INTERVAL)
     mean, error = statistics.displacement_diffusion(
         [replica.centres for replica in replicas], FREE_INTERVAL * step, lags, sampling.blocks
     )
     curves["free"] = Curve(np.array(lags) * FREE_INTERVAL * step, mean, error)
-    long = statistics.Estimate(float(mean[-1]), float(error[-1]))
+    long = Estimate(float(mean[-1]), float(error[-1]))
     short = statistics.one_step_diffusion(np.concatenate([replica.moments for replica in replicas]), step)
     return [
         Row(name, False, "short", ONE_STEP, short, expected, label),
         Row(name, False, "long", DISPLACEMENT, long, expected, label),
     ]
-
-
-def _lags(longest):
-    """About eight lags per factor of ten, the longest included, in records."""
-    count = 2 + int(8 * np.log10(longest))
-    return sorted({int(round(x)) for x in np.geomspace(1, longest, count)} | {longest})
 
 
 def _frames(solvent, trajectory):

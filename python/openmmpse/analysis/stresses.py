@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""Linear viscosity of what is in the solvent, from the stress at rest (Green and Kubo); docs/analysis.md [A8]."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from openmm import unit
+
+from .boxes import boxVectors
+from .estimates import Curve, blocksOf, meanOfBlocks, runsOf
+
+STRESS = unit.kilojoule_per_mole / unit.nanometer**3
+
+
+class GreenKubo(NamedTuple):
+    """What `greenKubo` finds."""
+
+    modulus: Curve  #: relaxation modulus G(t), kJ/(mol nm^3)
+    viscosity: Curve  #: its integral from 0 to t, Da/(nm ps): what the particles add to the viscosity of the solvent
+
+
+def greenKubo(stresses, interval, box, kT, longest, blocks=None, isotropic=True):
+    """`GreenKubo` of the stress at rest: G(t) = V/kT <s_xy(t) s_xy(0)> and its integral, with error bars [A8].
+
+    stresses   (samples, 3, 3), kJ/(mol nm^3), of integrator.computeStress() at even intervals without flow; or a list of
+               them, one per independent run
+    interval   ps; short against the fastest relaxation that counts
+    box        whose volume the stress is of: an edge, three edges or vectors
+    longest    time up to which both are wanted, ps. The error of the integral grows with it, so take its value where G
+               has vanished within its error, and not later
+    blocks     per run; None: ten in all. Each is to be many times `longest`
+    isotropic  True: the mean over all five independent shears, which have the same modulus in an isotropic fluid;
+               False: xy alone
+
+    In equilibrium the mean of a shear stress is zero and is not subtracted. The solvent's own viscosity is not in it.
+    """
+    runs = [_shears(run, isotropic) for run in runsOf(_plain(stresses))]
+    interval, volume = float(interval), float(np.linalg.det(boxVectors(box)))
+    most = int(round(float(longest) / interval))
+    if most < 1:
+        raise ValueError(f"longest is {longest} ps, less than the interval of {interval} ps between samples")
+    rows = np.array([volume / kT * _correlation(block, most) for block in blocksOf(runs, blocks, most)])
+    steps = (rows[:, 1:] + rows[:, :-1]) * interval / 2
+    integrals = np.hstack([np.zeros((len(rows), 1)), np.cumsum(steps, axis=1)])
+    times = interval * np.arange(most + 1)
+    return GreenKubo(Curve(times, *meanOfBlocks(rows)), Curve(times, *meanOfBlocks(integrals)))
+
+
+def _shears(stresses, isotropic):
+    """(samples, 5) or (samples, 1): stresses each of which has the variance of s_xy in an isotropic fluid.
+
+    The mean of s_ab s_ab of a traceless symmetric tensor is ten times that of s_xy s_xy.
+    """
+    if stresses.ndim != 3 or stresses.shape[1:] != (3, 3):
+        raise ValueError(f"expected stresses of shape (samples, 3, 3), got {stresses.shape}")
+    s = (stresses + stresses.transpose(0, 2, 1)) / 2
+    if not isotropic:
+        return s[:, 0, 1][:, None]
+    xx, yy, zz = s[:, 0, 0], s[:, 1, 1], s[:, 2, 2]
+    diagonals = [(xx - yy) / 2, (2 * zz - xx - yy) / (2 * math.sqrt(3))]
+    return np.stack([s[:, 0, 1], s[:, 0, 2], s[:, 1, 2], *diagonals], axis=1)
+
+
+def _correlation(values, longest):
+    """<v(t) v(0)>, averaged over the columns of (samples, columns), at lags 0 .. longest."""
+    samples = len(values)
+    size = 2 ** math.ceil(math.log2(samples + longest + 1))
+    waves = np.fft.rfft(values, size, axis=0)
+    sums = np.fft.irfft(np.square(np.abs(waves)).mean(axis=1), size)[: longest + 1]
+    return sums / (samples - np.arange(longest + 1))
+
+
+def _plain(stresses):
+    """Stresses without units, whether one array, a list of arrays or a list of single Quantities."""
+    if unit.is_quantity(stresses):
+        return stresses.value_in_unit(STRESS)
+    if isinstance(stresses, (list, tuple)):
+        values = [s.value_in_unit(STRESS) if unit.is_quantity(s) else s for s in stresses]
+        return np.array(values) if np.shape(values[0]) == (3, 3) else values
+    return stresses
