@@ -4,7 +4,7 @@
     python benchmarks/devices.py --platform CUDA --precision mixed --output devices.csv [--quick]
 
 Suspensions at tolerance 1e-3 without Forces but one on a single sphere. Each row: the best of several rounds, in which
-the Contexts with and without noise take turns; the share of the six transforms is that of describe(), whose measured
+the Contexts with and without noise take turns; the share of the six transforms is that of getStageTimes(), whose measured
 steps wait for the device after each stage. The device's name is written with the numbers.
 """
 
@@ -51,7 +51,7 @@ def measure(platform, precision, thousands, phi, steps, rounds):
     seconds = spheres.secondsPerStep([integrator for _, integrator in pairs], steps, rounds)
     context, integrator = pairs[1]
     parameters = integrator.getNumericalParameters()
-    stages = shares(integrator.describe())
+    stages = shares(integrator.getStageTimes())
     transforms = sum(share for name, share in stages.items() if "Fourier" in name)
     others = {name: share for name, share in stages.items() if "Fourier" not in name}
     worst = max(others, key=others.get)

@@ -2,7 +2,7 @@
 """Which effects are on in which scene, and what each costs: the table of docs/effects.md.
 
 Every scene runs on the CPU platform at tolerance 1e-3, dt D0/a^2 = 1e-3. Only one particle is pulled at, so the time of
-a step is that of the fluid; it is divided among the stages as describe() tells them. Scenes of one group take turns, so
+a step is that of the fluid; it is divided among the parts of the method by getStageTimes(). Scenes of one group take turns, so
 the ratios within a group mean more than the times.
 """
 import argparse
@@ -16,17 +16,6 @@ import openmm
 import spheres
 from openmmpse import PSEBrownianIntegrator
 from openmmpse.accuracy import stages
-
-# column of the table -> stages of the platforms that belong to it
-COLUMNS = {
-    "positions": r"sorting|positions|neighbours",
-    "pairs": r"velocities",
-    "pair noise": r"Lanczos",
-    "spread, FFT, gather": r"spreading|gathering",
-    "waves and their noise": r"waves",
-    "moving box": r"box",
-    "free draining": r"free draining",
-}
 
 
 @dataclass
@@ -62,13 +51,8 @@ class Scene:
     def row(self):
         """Milliseconds of a step, in all and by column."""
         total = 1e3*np.median(self.seconds)
-        cells = dict.fromkeys(COLUMNS, 0.0)
-        for stage, share in stages.shares(self.integrator.describe()).items():
-            columns = [column for column, pattern in COLUMNS.items() if re.search(pattern, stage)]
-            if not columns:
-                raise ValueError(f"no column for the stage '{stage}'")
-            cells[columns[0]] += share*total
-        return total, cells
+        parts = stages.partsOf(self.integrator.getStageTimes())
+        return total, {part: share*total for part, share in parts.items()}
 
     def effects(self):
         """Those that are on, in words."""
@@ -124,7 +108,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--output", type=Path, help="write the table here, too")
     arguments = parser.parse_args()
-    lines = ["| scene | effects | ms per step | " + " | ".join(COLUMNS) + " |", "|---|---|" + "---:|"*(1 + len(COLUMNS))]
+    lines = ["| scene | effects | ms per step | " + " | ".join(stages.PARTS) + " |", "|---|---|" + "---:|"*(1 + len(stages.PARTS))]
     print("\n".join(lines))
     for group in groups(arguments.particles):
         for scene in group:

@@ -65,6 +65,17 @@ inline PyObject* toDict(const std::map<int, double>& values) {
     return dict;
 }
 
+/** New reference to a dict: stage -> seconds, in the order of the stages. */
+inline PyObject* toDict(const std::vector<StageTime>& times) {
+    PyObject* dict = PyDict_New();
+    for (const StageTime& time : times) {
+        PyObject* seconds = PyFloat_FromDouble(time.seconds);
+        PyDict_SetItemString(dict, time.stage.c_str(), seconds);
+        Py_DECREF(seconds);
+    }
+    return dict;
+}
+
 /** Reaches the Context of an integrator, which OpenMM keeps to derived classes. */
 struct ContextAccess : OpenMM::Integrator {
     static OpenMM::ContextImpl* of(const OpenMM::Integrator& integrator) {
@@ -80,14 +91,13 @@ inline int particleCount(const OpenMM::Integrator& integrator) {
 
 /** New reference to the dict that Python sees for NumericalParameters. */
 inline PyObject* toDict(const NumericalParameters& p) {
-    return Py_BuildValue("{s:s,s:d,s:d,s:d,s:(iii),s:i,s:d,s:d,s:i,s:d,s:s,s:i}", "split",
-                         p.split.c_str(), "xi", p.xi, "realCutoff", p.realCutoff,
-                         "prolateBandwidth", p.prolateBandwidth, "gridDimensions",
-                         p.gridDimensions[0], p.gridDimensions[1], p.gridDimensions[2],
-                         "windowSupport", p.windowSupport, "windowShape", p.windowShape,
-                         "lanczosTolerance", p.lanczosTolerance, "lanczosIterations",
-                         p.lanczosIterations, "predictedError", p.predictedError, "precision",
-                         p.precision.c_str(), "randomSeed", p.randomSeed);
+    return Py_BuildValue(
+        "{s:s,s:d,s:d,s:d,s:(iii),s:i,s:d,s:d,s:i,s:d,s:s,s:s,s:i}", "split", p.split.c_str(), "xi",
+        p.xi, "realCutoff", p.realCutoff, "prolateBandwidth", p.prolateBandwidth, "gridDimensions",
+        p.gridDimensions[0], p.gridDimensions[1], p.gridDimensions[2], "windowSupport",
+        p.windowSupport, "windowShape", p.windowShape, "lanczosTolerance", p.lanczosTolerance,
+        "lanczosIterations", p.lanczosIterations, "predictedError", p.predictedError, "precision",
+        p.precision.c_str(), "instructions", p.instructions.c_str(), "randomSeed", p.randomSeed);
 }
 
 /** Called in a catch block, with the GIL held. */

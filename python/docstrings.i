@@ -275,6 +275,7 @@ dict
     realCutoff (in nm; 0 for AllWaves, which has no real half), prolateBandwidth (0 for another split), gridDimensions (tuple of three int),
     windowSupport, windowShape, lanczosTolerance, lanczosIterations (of the last thermal step),
     predictedError (of M f, relative to |f/(6 pi eta a)|), precision ("single" or "double"),
+    instructions (the set that the loops of the CPU platform use, such as "AVX2"; "" elsewhere),
     randomSeed (the one in use). Plain numbers; without hydrodynamic interaction xi is 0 and
     gridDimensions (0, 0, 0).
 
@@ -298,8 +299,8 @@ Parameters
 ----------
 parameters : dict
     what getNumericalParameters() returned there, or some of its entries. Missing entries, zeros and
-    empty strings stay automatic; lanczosIterations, predictedError and precision are ignored; a
-    non-zero randomSeed sets the seed.
+    empty strings stay automatic; lanczosIterations, predictedError, precision and instructions are
+    ignored; a non-zero randomSeed sets the seed.
 
 Raises
 ------
@@ -396,6 +397,21 @@ openmm.OpenMMException
     if there is no Context or no periodic box, a position is not finite, a Force has no energy in a
     box strained by up to 0.007, or, on OpenCL and CUDA, the default box is rectangular and the
     interparticle part is asked for
+%}
+%feature("docstring") PSE::PSEBrownianIntegrator::getStageTimes %{
+Get what each stage of the steps so far has cost, without the Forces.
+
+Returns
+-------
+dict
+    stage -> wall-clock time (in s), >= 0, in the order in which stages first ran; only stages of
+    active effects, and none before the first step. On OpenCL and CUDA a few steps are measured:
+    there only the ratios mean something.
+
+Raises
+------
+openmm.OpenMMException
+    if the integrator has no Context yet
 %}
 %feature("docstring") PSE::PSEBrownianIntegrator::describe %{
 Tell which effects are active and why, the parameters in use and what share of a step each costs.

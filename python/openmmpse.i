@@ -57,6 +57,8 @@ PSE_WITHOUT_GIL(computeStress)
 
 // ---- structures ----
 
+%typemap(out) std::vector<PSE::StageTime> { $result = toDict($1); }
+
 %typemap(out) PSE::NumericalParameters, std::map<int, double> { $result = toDict($1); }
 %typemap(out) const PSE::NumericalParameters&, const std::map<int, double>& {
     $result = toDict(*$1);
@@ -167,6 +169,7 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 
 #define OPENMM_EXPORT_PSE
 %ignore PSE::NumericalParameters;
+%ignore PSE::StageTime;
 %ignore PSE::PSEBrownianIntegrator::step;
 %feature("notabstract") PSE::PSEBrownianIntegrator;
 %include "openmmpse/PSEBrownianIntegrator.h"

@@ -4,9 +4,11 @@ import ast
 import copy
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import openmm
@@ -297,15 +299,33 @@ def testMeanLengthIsFreeOfTheBiasOfNoise():
     assert 0 < limits.meanLength(pure) < 0.5*np.linalg.norm(pure.mean(axis=0))
 
 
-# ---------------------------------------------------------------- what describe() says
+# ---------------------------------------------------------------- stages of a step
 
-def testStagesAreReadFromTheDescription(small, platformName):
-    text = "fluid: periodic 50 %\ncost of the steps so far, without the Forces: waves (a, b) 60 %, b 39 %, c 1 %\n"
-    assert stages.shares(text) == {"waves (a, b)": 0.6, "b": 0.39, "c": 0.01}
+def testSharesOfStagesAndParts(small, platformName):
+    times = {"spreading": 3.0, "gathering": 2.0, "wave factors of the moving box": 5.0}
+    assert stages.shares(times) == {"spreading": 0.3, "gathering": 0.2, "wave factors of the moving box": 0.5}
+    parts = stages.partsOf(times)
+    assert list(parts) == list(stages.PARTS) and parts["grid"] == 0.5 == parts["moving box"] and sum(parts.values()) == 1
     probe = sceneOf(small, platformName).probe(1e-3)
-    assert stages.shares(probe.integrator.describe()) == {}
+    assert stages.partsOf(probe.integrator.getStageTimes()) == {} == probe.integrator.getStageTimes()
     probe.integrator.step(3)
-    assert sum(stages.shares(probe.integrator.describe()).values()) == pytest.approx(1, abs=0.06)
+    times = probe.integrator.getStageTimes()
+    assert min(times.values()) >= 0 < sum(times.values())
+    cost = next(line for line in probe.integrator.describe().splitlines() if line.startswith("cost"))
+    for stage, share in stages.shares(times).items():
+        assert f" {stage} {100*share:.0f} %" in cost
+    assert sum(stages.partsOf(times).values()) == pytest.approx(1, abs=1e-12)
+
+
+def testEveryStageBelongsToAPart():
+    """All names in the sources of the platforms, and none that only looks like one."""
+    sources = [path.read_text() for path in (Path(__file__).parents[1]/"platforms").rglob("*") if path.is_file()]
+    names = {name for text in sources for call in re.findall(r"charge\(([^;]*)\);|MOVING_BOX\[\] = (.*);", text)
+             for name in re.findall(r'"([^"]+)"', "".join(call))}
+    assert len(names) > 15 and "wave factors of the moving box" in names
+    assert {stages.partOf(name) for name in names} == set(stages.PARTS)
+    with pytest.raises(ValueError, match="turbulence"):
+        stages.partOf("turbulence")
 
 
 # ---------------------------------------------------------------- tuning

@@ -31,7 +31,8 @@ SPLITS = {"automatic": PSEBrownianIntegrator.AutomaticSplit,
           "Prolate": PSEBrownianIntegrator.Prolate, "Hasimoto": PSEBrownianIntegrator.Hasimoto}
 PARAMETER_KEYS = {
     "split", "xi", "realCutoff", "prolateBandwidth", "gridDimensions", "windowSupport", "windowShape",
-    "lanczosTolerance", "lanczosIterations", "predictedError", "precision", "randomSeed"}
+    "lanczosTolerance", "lanczosIterations", "predictedError", "precision", "instructions",
+    "randomSeed"}
 
 
 def outsideTheBox(scene, farthest, seed=21):

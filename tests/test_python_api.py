@@ -51,6 +51,7 @@ KEYS = {
     "lanczosIterations",
     "predictedError",
     "precision",
+    "instructions",
     "randomSeed",
 }
 
@@ -318,6 +319,7 @@ def testNumericalParametersOfAContext(platformName):
     types = {
         "split": str,
         "precision": str,
+        "instructions": str,
         "gridDimensions": tuple,
         "windowSupport": int,
         "lanczosIterations": int,
@@ -349,6 +351,7 @@ def testRequestedNumericalParameters():
             "lanczosIterations": 4,
             "predictedError": 1e-3,
             "precision": "double",
+            "instructions": "AVX2",
         }
     )
     requested = integrator.getRequestedNumericalParameters()

@@ -72,7 +72,7 @@ def splits():
 
 def realShare(integrator):
     """Share of the real half in the steps so far, by the names of the stages."""
-    shares = stages.shares(integrator.describe())
+    shares = stages.shares(integrator.getStageTimes())
     return sum(share for name, share in shares.items() if any(word in name for word in REAL_WORDS))
 
 

@@ -50,7 +50,10 @@ void describeNumerics(std::ostream& out, const PSEBrownianIntegrator& integrator
         out << ", direct sums over all pairs";
     if (p.lanczosTolerance > 0)
         out << ", Lanczos tolerance " << p.lanczosTolerance;
-    out << ", " << p.precision << " precision" << endl;
+    out << ", " << p.precision << " precision";
+    if (!p.instructions.empty())
+        out << ", " << p.instructions << " instructions";
+    out << endl;
 }
 
 void describeSplit(std::ostream& out, const NumericalParameters& p) {

@@ -335,6 +335,11 @@ NumericalParameters PSEBrownianIntegrator::getNumericalParameters() const {
     return kernel.getAs<const IntegratePSEStepKernel>().getNumericalParameters();
 }
 
+vector<StageTime> PSEBrownianIntegrator::getStageTimes() const {
+    requireBound("getStageTimes");
+    return kernel.getAs<const IntegratePSEStepKernel>().getStageTimes();
+}
+
 double PSEBrownianIntegrator::getStrain() const {
     requireBound("getStrain");
     return kernel.getAs<const IntegratePSEStepKernel>().getStrain();

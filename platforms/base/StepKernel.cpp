@@ -352,6 +352,7 @@ NumericalParameters PlannedStepKernel::parametersOf(const Plan& plan) const {
     NumericalParameters p;
     p.split = "none";
     p.precision = (unboundedPlan ? precisionName(*unboundedPlan) : precisionName(plan));
+    p.instructions = instructions();
     p.randomSeed = seed;
     if (unboundedPlan) {
         p.lanczosTolerance = unboundedPlan->lanczosTolerance;

@@ -71,6 +71,8 @@ protected:
     /** As getNumericalParameters() tells it; without a Plan, it has no split. */
     virtual std::string precisionName(const numerics::Plan& plan) const = 0;
     virtual std::string precisionName(const numerics::UnboundedPlan& plan) const = 0;
+    /** The instruction set of loops on the host; empty if there is no choice. */
+    virtual std::string instructions() const { return ""; }
     /** Whether Forces can be computed in a box that is not rectangular. */
     virtual bool boxCanTilt() const { return true; }
     /** Relative rounding of a coordinate of the Context. */

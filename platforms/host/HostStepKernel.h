@@ -42,6 +42,7 @@ protected:
     int lanczosIterations() const override { return engine->lanczosIterations(); }
     std::string precisionName(const numerics::Plan& plan) const override;
     std::string precisionName(const numerics::UnboundedPlan& plan) const override;
+    std::string instructions() const override { return factory->instructions(); }
 
 private:
     /** Follow the box of the Context, and give the engine the current positions. */

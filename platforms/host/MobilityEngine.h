@@ -56,6 +56,8 @@ public:
     virtual void followBox(const std::vector<OpenMM::Vec3>&, const OpenMM::Vec3*) {}
     /** A restart begins here: what OpenMM keeps shall not depend on earlier steps. */
     virtual void startAnew() {}
+    /** The instruction set of the loops; empty if there is no choice. */
+    virtual std::string instructions() const { return ""; }
     /**
      * @param indices  particle index in the System of each mobile particle: noise belongs to the
      * particle

@@ -5,6 +5,7 @@ Everything here returns plain numbers and arrays in OpenMM's units (nm, ps, Da, 
 """
 
 import operator
+from typing import TypedDict
 
 import numpy
 from openmm import unit
@@ -13,6 +14,25 @@ VISCOSITY_UNIT = unit.dalton / (unit.nanometer * unit.picosecond)
 STRESS_UNIT = unit.kilojoule_per_mole / unit.nanometer**3
 FORCE_UNIT = unit.kilojoule_per_mole / unit.nanometer
 PARTICLES_PER_MOLE = unit.AVOGADRO_CONSTANT_NA.value_in_unit(unit.mole**-1)
+
+
+class NumericalParameters(TypedDict):
+    """What getNumericalParameters() returns; its documentation has meanings and units."""
+
+    split: str
+    xi: float
+    realCutoff: float
+    prolateBandwidth: float
+    gridDimensions: tuple[int, int, int]
+    windowSupport: int
+    windowShape: float
+    lanczosTolerance: float
+    lanczosIterations: int
+    predictedError: float
+    precision: str
+    instructions: str
+    randomSeed: int
+
 
 # What setNumericalParameters() takes, in the order of the C++ call, with the "automatic" value.
 SETTABLE = {
@@ -27,7 +47,7 @@ SETTABLE = {
     "randomSeed": 0,
 }
 UNITS = {"xi": unit.nanometer**-1, "realCutoff": unit.nanometer}
-REPORTED = ("lanczosIterations", "predictedError", "precision")
+REPORTED = ("lanczosIterations", "predictedError", "precision", "instructions")
 
 
 def _split(quantity, expected, name):

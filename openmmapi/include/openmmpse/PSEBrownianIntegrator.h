@@ -40,11 +40,20 @@ struct OPENMM_EXPORT_PSE NumericalParameters {
     double predictedError = 0;
     /// "single" or "double" arrays for the fluid (reported, never set)
     std::string precision;
+    /// instruction set of the loops on the CPU platform, such as "AVX2"; empty elsewhere (reported,
+    /// never set)
+    std::string instructions;
     /// seed in use; drawn if 0 was asked for (reported; set by setRandomNumberSeed())
     int randomSeed = 0;
     std::string splitReason; ///< why this split, in the words of describe() (never set)
     /// functions of the radius that interpolate pairs of unequal spheres; 0: none do (never set)
     int radiusFunctions = 0;
+};
+
+/** Wall-clock time spent in one stage of the steps so far. */
+struct OPENMM_EXPORT_PSE StageTime {
+    std::string stage;
+    double seconds;
 };
 
 /**
@@ -276,6 +285,12 @@ public:
     double getStrain() const;
     /** Get the numerical parameters that the Context really uses, and the error they predict. */
     NumericalParameters getNumericalParameters() const;
+    /**
+     * Get the wall-clock time of each stage of the steps so far (in s), without the Forces: one
+     * entry per stage of an active effect, none before the first step. On OpenCL and CUDA a few
+     * steps are measured, and only the ratios mean something.
+     */
+    std::vector<StageTime> getStageTimes() const;
     /**
      * Tell in words which effects are active and why, the parameters in use, and what share of a
      * step each costs.

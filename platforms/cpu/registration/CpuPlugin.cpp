@@ -3,6 +3,7 @@
 #include "CpuFreeDraining.h"
 #include "CpuUnbounded.h"
 #include "HostStepKernel.h"
+#include "Instructions.h"
 #include "Memory.h"
 #include "NeighbourListKeeper.h"
 #include "openmm/KernelFactory.h"
@@ -30,6 +31,7 @@ public:
         lists.evaluate(positions, box, moves, forces);
     }
     void startAnew() override { lists.startAnew(); }
+    std::string instructions() const override { return instructionSet(); }
     void adapt(numerics::PlanRequest& request) const override {
         request.singleFloor = SINGLE_PRECISION_FLOOR;
         request.directSums = false;

@@ -205,7 +205,7 @@ class Sweep:
         bare = probe.secondsPerStep(ROUND_SECONDS, withForces=False)
         if bare is not None:
             row.bareTimes.append(bare)
-        row.stages = stages.shares(probe.integrator.describe())
+        row.stages = stages.shares(probe.integrator.getStageTimes())
         row.parameters = probe.parameters
 
 

@@ -21,15 +21,9 @@ struct OPENMM_EXPORT_PSE Scene {
     bool unbounded = false; ///< that fluid is infinite, and the box of the Context plays no part
     /// Forces or fluid see images of the particles: shear tilts the box
     bool periodicBox = false;
-    std::string barostat; ///< the kind of Force that moves the box; empty: none
+    std::string barostat;       ///< the kind of Force that moves the box; empty: none
     bool forceCoupling = false; ///< by Gaussian envelopes instead of rigid spheres' surfaces
     std::string modelReason, boundaryReason;
-};
-
-/** Wall-clock time spent in one stage of the steps so far. */
-struct OPENMM_EXPORT_PSE StageTime {
-    std::string stage;
-    double seconds;
 };
 
 /**
