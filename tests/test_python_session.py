@@ -8,6 +8,7 @@ import copy
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -352,12 +353,62 @@ def testDoctor(tmp_path):
         "603.419 Da/(nm ps)",
         "Reference  ok",
         "CPU        ok",
-        "SIMD",
+        "ms per step",
     ):
         assert text in output
+    lines = {line.split()[0]: line for line in output.splitlines() if line[0] != " "}
+    context, integrator = makeContextForInstructions()
+    assert f" {integrator.getNumericalParameters()['instructions']} in use" in lines["SIMD"]
+    assert re.search(r"fftw-3\.\d+\.\d+\S*, (bundled|the system's) \(/", lines["FFT"])
+    for device in plugins.DEVICES:
+        assert re.search(rf"{device} +(ok: 300 spheres|not used: .*(install|nothing))", lines[device])
     status, output, _ = runPython("-m", "openmmpse", "doctor", OPENMM_PLUGIN_DIR=str(tmp_path))
     assert status == 1
     assert "CPU        FAILED" in output and str(tmp_path) in output and "Reference  ok" in output
+    assert "none in use" in output and "unset it" in output and "pip install --force-reinstall" in output
+
+
+def makeContextForInstructions():
+    system = openmm.System()
+    system.addParticle(1)
+    integrator = PSEBrownianIntegrator(300, 600, 0.5, 0.01)
+    return contextOn("CPU", system, integrator), integrator
+
+
+def testDoctorNoticesWrongNumbers(monkeypatch, capsys):
+    """A mobility a tenth of a per cent off, noise a per cent off, and a mobility of one particle off by 1e-7."""
+    from openmmpse import doctor
+
+    monkeypatch.setattr(doctor, "SECONDS", 0.0)
+    assert doctor.checkPlatform("CPU") and doctor.checkPlatform("Reference")
+    text = capsys.readouterr().out
+    assert "CPU        ok" in text and "Reference  ok" in text
+    genuine = doctor.contextOf
+
+    class Wrong:
+        """An integrator that answers with numbers that are a little off."""
+
+        def __init__(self, integrator, mobility, noise):
+            self.integrator, self.mobility, self.noise = integrator, mobility, noise
+
+        def applyMobility(self, forces):
+            return self.mobility * self.integrator.applyMobility(forces)
+
+        def sampleBrownianDisplacements(self, count):
+            return self.noise * self.integrator.sampleBrownianDisplacements(count)
+
+        def __getattr__(self, name):
+            return getattr(self.integrator, name)
+
+    for platformName, mobility, noise in (("CPU", 1.002, 1), ("CPU", 1, 1.01), ("Reference", 1 + 1e-7, 1)):
+
+        def contextOf(name, *arguments):
+            context, integrator = genuine(name, *arguments)
+            return context, Wrong(integrator, mobility, noise) if name == platformName else integrator
+
+        monkeypatch.setattr(doctor, "contextOf", contextOf)
+        assert not doctor.checkPlatform(platformName)
+        assert f"{platformName:10} FAILED" in capsys.readouterr().out
 
 
 def testCommandLineUsage():
