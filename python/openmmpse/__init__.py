@@ -5,6 +5,7 @@ PSEBrownianIntegrator takes the place of openmm.BrownianIntegrator: see its docu
 `python -m openmmpse doctor` checks an installation, `python -m openmmpse demo` shows what it does, and
 `python -m openmmpse accuracy` (in Python: accuracy.measure) tells what accuracy costs for a scene of one's own.
 `openmmpse.analysis` makes diffusion and viscosity of trajectories, with error bars.
+HydrodynamicsReporter writes how the fluid fares in a Simulation, and `python -m openmmpse plot` draws it.
 """
 
 from importlib.metadata import version as _version
@@ -28,5 +29,8 @@ _loadMissing()
 
 from openmmpse import accuracy as accuracy  # noqa: E402  (needs the integrator above)
 from openmmpse import analysis as analysis  # noqa: E402
+from openmmpse.reporter import HydrodynamicsReporter as HydrodynamicsReporter  # noqa: E402
 
-__all__ = ["PSEBrownianIntegrator"]
+HydrodynamicsReporter.__module__ = __name__
+
+__all__ = ["HydrodynamicsReporter", "PSEBrownianIntegrator"]

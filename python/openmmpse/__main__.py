@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Command line: python -m openmmpse doctor | demo | accuracy."""
+"""Command line: python -m openmmpse doctor | demo | accuracy | plot."""
 
 import argparse
 import sys
@@ -23,10 +23,17 @@ def _accuracy(arguments):
     return accuracy.main(arguments)
 
 
+def _plot(arguments):
+    from openmmpse import plot
+
+    return plot.main(arguments)
+
+
 COMMANDS = {
     "doctor": (_doctor, "check the installation on every platform"),
     "demo": (_demo, "simulate a protein and a polymer in water and compare with theory"),
     "accuracy": (_accuracy, "measure error against time for your own scene and recommend a tolerance"),
+    "plot": (_plot, "draw what HydrodynamicsReporter wrote"),
 }
 
 
