@@ -43,6 +43,14 @@ constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
 constexpr double NEIGHBOURS_ALIKE = 400;
 
 /**
+ * Two independent errors together. Not by std::hypot: that asks for glibc 2.35, newer than what
+ * OpenMM's wheels need, and nothing here overflows.
+ */
+double rootOfSquares(double first, double second) {
+    return std::sqrt(first * first + second * second);
+}
+
+/**
  * Support and grid spacing that keep the error of the wave half, [T15]: digits + 2 points, or one
  * less on a finer grid.
  */
@@ -172,7 +180,7 @@ Magnification PlanFamily::magnificationOf(const Plan& plan) const {
 }
 
 void PlanFamily::predict(Plan& plan, double wave) const {
-    plan.predictedError = std::hypot(wave, realErrorOf(plan));
+    plan.predictedError = rootOfSquares(wave, realErrorOf(plan));
     const Magnification magnified = magnificationOf(plan);
     const bool finer = plan.predictedError < SINGLE_SHARE * request.singleFloor;
     if ((finer && !request.singleOnly) ||
@@ -185,8 +193,8 @@ void PlanFamily::predict(Plan& plan, double wave) const {
     plan.windowError = std::max(SMALLEST_WINDOW_ERROR, plan.tableError / usual);
     const double rounding =
         (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);
-    plan.predictedError = std::hypot(plan.predictedError,
-                                     magnified.of(rounding + (usual != 1 ? plan.windowError : 0)));
+    plan.predictedError = rootOfSquares(
+        plan.predictedError, magnified.of(rounding + (usual != 1 ? plan.windowError : 0)));
 }
 
 double PlanFamily::shapeOf(int support) const {
