@@ -9,12 +9,14 @@ Brownian dynamics of spheres that drag each other through the solvent:
 
 M is the Rotne-Prager-Yamakawa mobility of a fluid that is periodic in the box of the Context,
 evaluated by Positively Split Ewald (Fiore, Balboa Usabiaga, Donev, Swan, J. Chem. Phys. 146,
-124116 (2017)) at a cost linear in the number of particles; f are the forces of the System, and dW
-is a Wiener process whose increments obey fluctuation-dissipation to the same tolerance. Masses do
-not enter the motion, except that particles of mass zero neither move nor disturb the fluid.
-Velocities reported by the Context are displacement / step size.
+124116 (2017)) at a cost linear in the number of particles, or of infinite solvent, by sums over all
+pairs (setFluidBoundary()); f are the forces of the System, and dW is a Wiener process whose
+increments obey fluctuation-dissipation to the same tolerance. Masses do not enter the motion,
+except that particles of mass zero neither move nor disturb the fluid. Velocities reported by the
+Context are displacement / step size.
 
-The integrator stands where openmm.BrownianIntegrator stood, on the platforms Reference and CPU:
+The integrator stands where openmm.BrownianIntegrator stood, on every platform of OpenMM that has
+its plugin (Reference, CPU, OpenCL, CUDA):
 
     from openmm import Context, CustomExternalForce, Platform, System, Vec3, unit
     from openmmpse import PSEBrownianIntegrator
@@ -185,14 +187,15 @@ PSE_SETTER_DOC(setSplit, split, int,
     Set how M is divided into its real-space and wave-space half. Default AutomaticSplit.,
     PSEBrownianIntegrator.AutomaticSplit (Prolate where it is valid and not dearer) or .Prolate (real
     half exactly zero beyond its range; needs a range of 2.4 radii and more within half the box) or
-    .Hasimoto (the published one; any box; not for ForceCoupling) or .AllWaves (no real half at all; for
-    ForceCoupling alone; any box), if it is none of these or a Context exists)
+    .Hasimoto (the published one; any box; not for ForceCoupling) or .AllWaves (no real half at all;
+    for ForceCoupling alone; any box), if it is none of these or a Context exists)
 PSE_GETTER_DOC(getSplittingParameter, Quantity, Get the requested splitting parameter.,
     xi (in 1/nm); 0 means automatic)
 PSE_SETTER_DOC(setSplittingParameter, xi, Quantity or float,
     Set the splitting parameter: it moves cost between the halves of M and leaves the result.,
-    xi (in 1/nm) > 0 or 0 for automatic. For Prolate it is 1/range; AutomaticSplit takes it as 1/range
-    where that is valid and else as that of Hasimoto (ForceCoupling: always as 1/range), if it is negative or not finite or a Context exists)
+    xi (in 1/nm) > 0 or 0 for automatic. For Prolate it is 1/range; AutomaticSplit takes it as
+    1/range where that is valid and else as that of Hasimoto (ForceCoupling: always as 1/range),
+    if it is negative or not finite or a Context exists)
 PSE_GETTER_DOC(getGridDimensions, tuple of int, Get the requested grid.,
     points along the three box vectors; (0 0 0) means automatic)
 PSE_GETTER_DOC(getWindowSupport, int, Get the requested window support.,
@@ -272,9 +275,10 @@ Returns
 -------
 dict
     split ("Prolate" or "Hasimoto" or "AllWaves" or "none"), xi (in 1/nm; Prolate: 1/realCutoff),
-    realCutoff (in nm; 0 for AllWaves, which has no real half), prolateBandwidth (0 for another split), gridDimensions (tuple of three int),
-    windowSupport, windowShape, lanczosTolerance, lanczosIterations (of the last thermal step),
-    predictedError (of M f, relative to |f/(6 pi eta a)|), precision ("single" or "double"),
+    realCutoff (in nm; 0 for AllWaves, which has no real half), prolateBandwidth (0 for another
+    split), gridDimensions (tuple of three int), windowSupport, windowShape, lanczosTolerance,
+    lanczosIterations (of the last thermal step), predictedError (of M f, relative to
+    |f/(6 pi eta a)|), precision ("single" or "double"),
     instructions (the set that the loops of the CPU platform use, such as "AVX2"; "" elsewhere),
     randomSeed (the one in use). Plain numbers; without hydrodynamic interaction xi is 0 and
     gridDimensions (0, 0, 0).

@@ -18,9 +18,9 @@ RESOLUTION = 1e-7  #: differences of two products M f below this are the error o
 class Limits(NamedTuple):
     """The other errors of a run, relative; None: does not apply."""
 
-    timeStep: float | None
-    statistical: float | None
-    assumptions: str
+    timeStep: float | None  #: change of the mean velocity within a step
+    statistical: float | None  #: of a diffusion coefficient from the whole run
+    assumptions: str  #: of both, in one line
 
     @property
     def lowest(self):

@@ -15,7 +15,7 @@ KINDS = ("random", "uniform", "scene")  #: of forces: unit normals, all alike, t
 class Row:
     """One tolerance with one split. Errors are relative (docs/accuracy-and-speed.md), times are in seconds a step."""
 
-    tolerance: float
+    tolerance: float  #: that was set
     split: str  #: asked for: "automatic" may lead to either, parameters["split"] is the one in use
     parameters: dict  #: as getNumericalParameters() returns them
     errors: dict  #: kind of forces -> |u - M f|/max(|M f|, |f|/(6 pi eta a))
@@ -39,6 +39,7 @@ class Row:
 
     @property
     def bareSeconds(self):
+        """The same without Forces."""
         return min(self.bareTimes, default=None)
 
 
@@ -47,20 +48,22 @@ class Result:
     """A sweep over tolerances; rows in the order of their measurement, loosest tolerance first for each split."""
 
     count: int  #: particles that move
-    platform: str
+    platform: str  #: its name
     runLength: int  #: steps
-    referenceTolerance: float | None = None
-    limits: Limits | None = None
-    step: StepAdvice | None = None
-    rows: list = field(default_factory=list)
+    referenceTolerance: float | None = None  #: of the run that errors are measured against
+    limits: Limits | None = None  #: the other errors of the run
+    step: StepAdvice | None = None  #: a time step
+    rows: list = field(default_factory=list)  #: of `Row`
     notes: list = field(default_factory=list)  #: what was left out and why, assumptions
-    complete: bool = False
+    complete: bool = False  #: False while it runs, and after an interruption
 
     def rowsOf(self, split):
+        """Those of one split, as it was asked for."""
         return [row for row in self.rows if row.split == split]
 
     @property
     def splits(self):
+        """Names of the splits that were asked for."""
         return list(dict.fromkeys(row.split for row in self.rows))
 
     def recommendation(self, split=None) -> Recommendation | None:

@@ -31,14 +31,24 @@ class SceneError(ValueError):
 class Scene:
     """What moves, where it is, and how: a System, positions in a box, the settings of an integrator, a platform.
 
-    system      openmm.System
-    positions   (N, 3), nm or a Quantity
-    integrator  PSEBrownianIntegrator, which is copied; its tolerance and numerical parameters are not used
-    box         (3, 3) box vectors as rows, nm or a Quantity; default: that of the System
-    platform    name of an OpenMM platform that can run the integrator
-    properties  dict of platform properties, for example {"Threads": "2"}
+    Parameters
+    ----------
+    system : openmm.System
+    positions : array-like of shape (N, 3), or a Quantity of one
+        in nm
+    integrator : PSEBrownianIntegrator
+        it is copied; its tolerance and numerical parameters are not used
+    box : array-like of shape (3, 3), or a Quantity of one
+        box vectors as rows (nm); default: those of the System
+    platform : str
+        name of an OpenMM platform that can run the integrator
+    properties : dict
+        platform properties, for example {"Threads": "2"}
 
-    Raises SceneError for what cannot be measured.
+    Raises
+    ------
+    SceneError
+        for what cannot be measured
     """
 
     def __init__(self, system, positions, integrator, box=None, platform="CPU", properties=None):

@@ -12,7 +12,7 @@ from . import limits, stages, timestep
 from .results import KINDS, Result, Row
 from .scene import SceneError, checkNumbers, sceneOf
 
-TOLERANCES = tuple(10.0**-digits for digits in range(1, 9))
+TOLERANCES = tuple(10.0**-digits for digits in range(1, 9))  #: that `measure` goes through (dimensionless)
 TIGHTEST = 1e-10  #: that the library serves
 MARGIN = 10  #: the run that errors are measured against is tighter than all others by at least this factor
 ROUNDS = 5
@@ -25,22 +25,50 @@ DOUBLE_PRICE = 2.0
 def measure(source, positions=None, integrator=None, *, box=None, platform=None, properties=None, runLength=1_000_000,
             tolerances=TOLERANCES, split="automatic", correlationTime=None, budget=120.0, rounds=ROUNDS,
             progress=None, bias=timestep.BIAS):  # fmt: skip
-    """Measure what accuracy costs for a scene; returns a `Result`.
+    """Measure what accuracy costs for a scene.
 
-    source           openmm.Context with a PSEBrownianIntegrator, `Scene`, or openmm.System (then with positions and
-                     integrator, as `Scene` takes them)
-    box, platform, properties   as `Scene` takes them; default: those of the source
-    runLength        steps of the run that is planned: decides how large its statistical error will be
-    tolerances       to measure
-    split            "automatic", "Hasimoto", "Prolate", "AllWaves", or "both" for Hasimoto and Prolate
-    correlationTime  ps after which displacements of a particle count as independent; default: a^2/D0
-    budget           seconds that the tight run may take by estimate; if it would take more, a looser one is the
-                     reference, and tolerances less than ten times looser than that are left out
-    rounds           timed turns of each tolerance
-    progress         called with (text, share of the work done)
-    bias             relative error of the stiffest mode's variance that a time step is recommended for
+    Errors of M f and of the noise against a run at a tolerance of 1e-10, times of steps, and the other errors of the
+    run that is planned: docs/accuracy-and-speed.md derives them.
 
-    Raises SceneError for what cannot be measured, openmm.OpenMMException for what the library refuses.
+    Parameters
+    ----------
+    source : openmm.Context, Scene or openmm.System
+        with a PSEBrownianIntegrator; a System needs positions and integrator, too
+    positions : array-like of shape (N, 3), or a Quantity of one
+        in nm; see `Scene`
+    integrator : PSEBrownianIntegrator
+        see `Scene`
+    box, platform, properties
+        see `Scene`; default: those of the source
+    runLength : int
+        steps of the run that is planned, > 0: decides how large its statistical error will be
+    tolerances : sequence of float
+        to measure, each from 1e-10 to 1e-1
+    split : str
+        "automatic", "Hasimoto", "Prolate", "AllWaves", or "both" for Hasimoto and Prolate
+    correlationTime : float
+        time (ps) after which displacements of a particle count as independent, > 0; default: a^2/D0
+    budget : float
+        seconds that the tight run may take by estimate, > 0; if it would take more, a looser one is the reference,
+        and tolerances less than ten times looser than that are left out
+    rounds : int
+        timed turns of each tolerance, > 0
+    progress : callable
+        called with (text, share of the work done)
+    bias : float
+        relative error of the stiffest mode's variance that a time step is recommended for, > 0
+
+    Returns
+    -------
+    Result
+        with a `Row` for each tolerance and split
+
+    Raises
+    ------
+    SceneError
+        for what cannot be measured
+    openmm.OpenMMException
+        for what the library refuses
     """
     scene = sceneOf(source, positions, integrator, box, platform, properties)
     return Sweep(scene, runLength, tolerances, split, correlationTime, budget, rounds, progress, bias).run()
@@ -59,7 +87,13 @@ def forceKinds(scene, actual):
 
 
 class Sweep:
-    """A measurement in progress: `result` holds what is known so far, also after an interruption of run()."""
+    """A measurement in progress: `result`, a `Result`, holds what is known so far, also after an interruption of run().
+
+    Parameters
+    ----------
+    scene : Scene
+        what is measured; the other parameters are those of `measure`
+    """
 
     def __init__(self, scene, runLength=1_000_000, tolerances=TOLERANCES, split="automatic", correlationTime=None,
                  budget=120.0, rounds=ROUNDS, progress=None, bias=timestep.BIAS):  # fmt: skip
@@ -72,7 +106,7 @@ class Sweep:
         self._probes = []
 
     def run(self):
-        """Measure everything; returns the `Result`."""
+        """Measure everything, and return the `Result`."""
         self._total = 3 + len(self.splits) * len(self.tolerances) * (1 + self.rounds)
         self._done = 0
         if self.scene.prescribed:

@@ -30,13 +30,13 @@ class StepAdvice(NamedTuple):
     present: float  #: the step of the integrator
     bias: float | None  #: relative error of that mode's variance at the present step; infinite if it blows up
     wanted: float  #: the error that `recommended` allows
-    recommended: float | None
-    reason: str
+    recommended: float | None  #: the step with that error
+    reason: str  #: what limits it, in words
 
 
 def recommendStep(source, positions=None, integrator=None, *, box=None, platform=None, properties=None, bias=BIAS,
                   configurations=CONFIGURATIONS):  # fmt: skip
-    """`StepAdvice`: the step size at which the variance of the stiffest mode is off by a fraction `bias`.
+    """Recommend the step size at which the variance of the stiffest mode is off by a fraction `bias`.
 
     A mode that relaxes at the rate w keeps the variance (kT/k)/(1 - w dt/2) instead of kT/k, so a step of
 
@@ -44,19 +44,39 @@ def recommendStep(source, positions=None, integrator=None, *, box=None, platform
 
     has the wanted bias in the stiffest mode, and less in all others and in every sum of them, as lengths of bonds and
     radii of gyration are; 2/w is the limit of stability. w is the largest eigenvalue of M K, M the mobility and K the
-    derivatives of the forces, by Lanczos's method with K in central differences. Of `configurations` along a short run
-    (which begins at the positions given, with steps as found so far) the largest counts, because curvature varies where
-    forces are steep; where the box moves, only the first. Relax the scene first: an overlap that equilibrium does not
-    have makes the steps shorter than need be.
+    derivatives of the forces, by Lanczos's method with K in central differences, to 0.2 % (docs/time-step.md). Relax
+    the scene first: an overlap that equilibrium does not have makes the steps shorter than need be.
 
     Where no forces limit it, or softer ones than the fluid, the step is that of an rms displacement of 0.3 radii, in
     which the mobility changes.
 
-    source and the arguments up to properties: as `measure` takes them, which `bias` and `configurations` are not part of
-
     Example:
+
         advice = openmmpse.accuracy.recommendStep(simulation.context, bias=0.01)
         integrator.setStepSize(advice.recommended * unit.picosecond)
+
+    Parameters
+    ----------
+    source, positions, integrator, box, platform, properties
+        as in `measure`
+    bias : float
+        wanted relative error of the variance, > 0
+    configurations : int
+        that the curvature is looked for at, > 0, along a short run which begins at the positions given, with steps as
+        found so far; the largest counts, because curvature varies where forces are steep. Where the box moves, only
+        the first
+
+    Returns
+    -------
+    StepAdvice
+        steps in ps
+
+    Raises
+    ------
+    SceneError
+        for what cannot be measured
+    openmm.OpenMMException
+        for what the library refuses
     """
     checkNumbers(bias=bias, configurations=configurations)
     return advise(sceneOf(source, positions, integrator, box, platform, properties), bias, int(configurations))

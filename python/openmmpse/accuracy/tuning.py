@@ -20,7 +20,7 @@ SLACK = 1.5  #: candidates may be in error by that many tolerances: the measured
 class Candidate:
     """One choice of numerical parameters, with what it takes to make it."""
 
-    label: str
+    label: str  #: in words
     settings: dict  #: for setNumericalParameters(); empty: automatic
     parameters: dict = field(default_factory=dict)  #: in use
     error: float = 0.0  #: of M f for random forces, as in `Row.errors`
@@ -28,6 +28,7 @@ class Candidate:
 
     @property
     def seconds(self):
+        """The best of the timed rounds (s)."""
         return min(self.times)
 
 
@@ -35,12 +36,13 @@ class Candidate:
 class Tuning:
     """Candidates at one tolerance; the first is the automatic choice."""
 
-    tolerance: float
-    candidates: list
-    notes: list = field(default_factory=list)
+    tolerance: float  #: of all candidates
+    candidates: list  #: of `Candidate`
+    notes: list = field(default_factory=list)  #: what was left out and why
 
     @property
     def automatic(self):
+        """The automatic choice."""
         return self.candidates[0]
 
     @property
@@ -57,10 +59,30 @@ class Tuning:
 
 def tune(source, positions=None, integrator=None, *, box=None, platform=None, properties=None, tolerance=1e-3,
          split="automatic", rounds=ROUNDS, progress=None):  # fmt: skip
-    """Time steps with other splitting parameters and window supports than the automatic ones; returns a `Tuning`.
+    """Time steps with other splitting parameters and window supports than the automatic ones.
 
-    Nothing is changed: tuning.best.settings is what a user may give to setNumericalParameters(), for this scene and
-    machine. Arguments as in `measure`.
+    Nothing is changed: `tuning.best.settings` is what a user may give to setNumericalParameters(), for this scene and
+    machine. Splitting parameters from half to twice the automatic one and one grid point more and less of support are
+    tried.
+
+    Parameters
+    ----------
+    tolerance : float
+        from 1e-10 to 1e-1
+    source, positions, integrator, box, platform, properties, split, rounds, progress
+        as in `measure`
+
+    Returns
+    -------
+    Tuning
+        a `Candidate` for each choice, the automatic one first
+
+    Raises
+    ------
+    SceneError
+        for what cannot be measured
+    openmm.OpenMMException
+        for what the library refuses
     """
     checkNumbers(rounds=rounds)
     (tolerance,) = checkedTolerances([tolerance])
