@@ -13,13 +13,20 @@ namespace PSE::numerics {
 
 namespace {
 
-/// of the tolerance, for both halves
-constexpr double BUDGET = 0.8;
-/// of that for what the envelope drops or the real half leaves out, the rest for the grid
-constexpr double DROPPED_SHARE = 0.6;
+/// Of the tolerance, for the grid, and for what the envelope drops or the real half leaves out:
+/// they add in squares. Pairs are what a step of a mixture spends most of its time on, and an error
+/// allowed to the real half shortens their range more than one allowed to the grid widens its mesh.
+constexpr double BUDGET = 0.5, REAL_BUDGET = 0.74;
+/// the same in the unit of PlanFamily::error
+constexpr double DROPPED_SHARE = REAL_BUDGET / BUDGET;
+/// of the tolerance, for the whole error: what the grid is finer than it need be, a shorter range
+/// may use up
+constexpr double PREDICTED_SHARE = 0.96;
+/// how closely that range is sought
+constexpr double RANGE_PRECISION = 0.01;
 constexpr double BANDWIDTH_STEP = 1.0 / 64; ///< as ProlatePlans
 /// of R/c: pairs may end before R + ai + aj by about the inverse of the largest wave number
-constexpr double CUT = 0.85;
+constexpr double CUT = 1.0;
 /// how far from the rule the bandwidth is sought that pairs beyond their ranges ask for
 constexpr double BANDWIDTH_BELOW = 2, BANDWIDTH_ABOVE = 4;
 /// from one range to the next, and the smallest, in radii of the smallest sphere
@@ -123,7 +130,7 @@ double MixturePlans::cost(const Plan& plan) const {
                    (outer * outer * outer - inner * inner * inner);
     }
     return touched * (CostModel::SPREAD_RADIAL + degree * CostModel::SPREAD_POWER) +
-           CostModel::step(0, plan.gridPoints(), 0, pairs, products());
+           CostModel::step(0, plan.gridPoints(), 0, CostModel::MIXTURE_PAIR * pairs, products());
 }
 
 double MixturePlans::givenRange() const {
@@ -267,9 +274,9 @@ Plan MixturePlans::cheapest(double shortest) const {
             lowest = price;
             best = plan;
         }
-        if (wish.grid[0] == 0 &&
-            CostModel::step(0, 0, 0, pairsOf(plan.mixture->rangeOfPoints(), false), products()) >
-                lowest)
+        const double pairs =
+            CostModel::MIXTURE_PAIR * pairsOf(plan.mixture->rangeOfPoints(), false);
+        if (wish.grid[0] == 0 && CostModel::step(0, 0, 0, pairs, products()) > lowest)
             break;
     }
     return best;
@@ -336,13 +343,36 @@ Plan MixturePlans::refined(const Plan& plan) const {
     return other;
 }
 
+Plan MixturePlans::tightened(const Plan& plan, double shortest) const {
+    const PlanOverrides& wish = request.overrides;
+    if (!isProlate() || wish.bandwidth > 0 || wish.grid[0] > 0 || givenRange() > 0)
+        return plan;
+    const double allowed = PREDICTED_SHARE / BUDGET * error;
+    Plan best = plan;
+    double high = plan.mixture->shape().range(), low = high / RANGE_FACTOR;
+    while (high - low > RANGE_PRECISION * high) {
+        const double mid = 0.5 * (low + high);
+        Plan other = refined(at(mid));
+        other.grid = plan.grid;
+        other.windowSupport = plan.windowSupport;
+        other.windowShape = plan.windowShape;
+        predict(other, waveErrorOf(other));
+        const bool keeps = other.predictedError <= allowed && other.precision == plan.precision &&
+                           other.mixture->rangeOfPoints() > shortest;
+        (keeps ? high : low) = mid;
+        if (keeps)
+            best = other;
+    }
+    return best;
+}
+
 Plan MixturePlans::finishedBeyond(double shortest) const {
     Plan plan = cheapest(shortest);
     if (!plan.mixture)
         return plan;
     plan = refined(plan);
     checkPlan(plan, request);
-    plan = finished(plan, unitOf(plan));
+    plan = tightened(finished(plan, unitOf(plan)), shortest);
     plan.windowSpacing = RadialWindow::spacing(box, plan.grid);
     plan.splitReason = (request.split == SplitChoice::Automatic ? "default" : "as prescribed");
     requireTolerance(plan);

@@ -14,7 +14,7 @@ struct CostModel {
     /// per particle and point of its P^3 window: spread and gather, three components
     static constexpr double SPREAD = 2;
     /// the same per point of the ball or shell of a radial window, and per power of its polynomial
-    static constexpr double SPREAD_RADIAL = 5, SPREAD_POWER = 0.16;
+    static constexpr double SPREAD_RADIAL = 3.7, SPREAD_POWER = 0.16;
     /// per grid point: six real transforms, noise, wave factor
     static constexpr double GRID = 75;
     /// per particle and mode of a direct sum, there and back
@@ -22,6 +22,8 @@ struct CostModel {
     /// per ordered pair in range: distance and coefficients
     static constexpr double PAIR_BUILD = 30;
     static constexpr double PAIR_APPLY = 5; ///< per ordered pair in range and product with M_R
+    /// times both for a pair of a mixture: more candidates beyond its own range, longer polynomials
+    static constexpr double MIXTURE_PAIR = 1.7;
 
     /**
      * @param pairs   ordered pairs (images included) in range

@@ -35,7 +35,10 @@ constexpr double SINGLE_SHARE = 0.1;
 /// of the tolerance, for what the window makes of rounding in single precision
 constexpr double ROUNDING_SHARE = 0.2;
 /// of windows by the rules, which the table's share of the budget covers
-constexpr double USUAL_MAGNIFICATION = 8, LEAST_RADIAL_MAGNIFICATION = 2;
+constexpr double USUAL_MAGNIFICATION = 8;
+/// Radial windows may err by this many times that share, divided by their magnification: 0.3
+/// tolerances in M f where there are few neighbours; they take fewer terms then.
+constexpr double COVERED_RADIAL = 12, LEAST_RADIAL_MAGNIFICATION = 1;
 constexpr double SMALLEST_WINDOW_ERROR = 1e-12;
 constexpr double SINGLE_ROUNDING = 3e-7, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
@@ -187,9 +190,9 @@ void PlanFamily::predict(Plan& plan, double wave) const {
         magnified.of(SINGLE_ROUNDING) > ROUNDING_SHARE * request.tolerance)
         plan.precision = Precision::Double;
     // Fewer terms of a radial window are worth some error.
-    const double least = (plan.mixture ? LEAST_RADIAL_MAGNIFICATION : USUAL_MAGNIFICATION),
-                 usual = std::max(least, magnified.of(plan.tableError) / plan.tableError) /
-                         USUAL_MAGNIFICATION;
+    const double covered = (plan.mixture ? COVERED_RADIAL : USUAL_MAGNIFICATION),
+                 least = (plan.mixture ? LEAST_RADIAL_MAGNIFICATION : USUAL_MAGNIFICATION),
+                 usual = std::max(least, magnified.of(plan.tableError) / plan.tableError) / covered;
     plan.windowError = std::max(SMALLEST_WINDOW_ERROR, plan.tableError / usual);
     const double rounding =
         (plan.precision == Precision::Single ? SINGLE_ROUNDING : DOUBLE_ROUNDING);

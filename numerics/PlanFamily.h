@@ -68,6 +68,8 @@ protected:
      * @param unit  the Nyquist wave number (1/a) about which the grid is sought
      */
     Plan finished(const Plan& plan, double unit) const;
+    /** Set the predicted error, and the precision that it needs. */
+    void predict(Plan& plan, double wave) const;
     /** That no grid helps this window, in words. */
     std::string windowRefusal(const Plan& plan, double wave) const;
 
@@ -80,8 +82,6 @@ protected:
 private:
     /** The smallest grid that keeps the budget by the full estimate; false if there is none. */
     bool fitGrid(Plan& plan, double unit, double& wave) const;
-    /** Set the predicted error, and the precision that it needs. */
-    void predict(Plan& plan, double wave) const;
 };
 
 /** Plans with Hasimoto's split, by xi: each half may use half of the tolerance. */
@@ -186,10 +186,14 @@ private:
     /** The same with the smallest bandwidth for which the pairs beyond their ranges keep their
      * share. */
     Plan refined(const Plan& plan) const;
+    /**
+     * With the shortest range that keeps the tolerance on the grid that the plan has; that of point
+     * forces stays beyond `shortest`.
+     */
+    Plan tightened(const Plan& plan, double shortest) const;
     std::shared_ptr<const Mixture> hasimotoMixture(double xi) const;
     /** Candidate with a prolate range R, or Hasimoto's xi, and the grid of a closed rule. */
     Plan at(double parameter) const;
-    void setRange(Plan& plan, double R) const;
     double unitOf(const Plan& plan) const;
     /** Of ranges of point forces beyond `shortest`; without a mixture if there is none. */
     Plan cheapest(double shortest) const;
