@@ -58,8 +58,9 @@ struct UnequalSpheres {
     HWY_INLINE void operator()(D d, const AllPairs<Real>& p, int i, int j, hn::Vec<D> r2,
                                hn::Vec<D>& F, hn::Vec<D>& C) const {
         r2 = hn::Max(r2, hn::Set(d, Real(SMALLEST_R2<Real>)));
-        rpyOfUnequal(d, r2, inverseRoot(d, r2), hn::Set(d, p.radius[i]), hn::LoadU(d, p.radius + j),
-                     F, C);
+        const auto own = hn::Set(d, p.radius[i]), other = hn::LoadU(d, p.radius + j);
+        const auto inverse = hn::Div(hn::Set(d, Real(1)), hn::Mul(own, other));
+        rpyOfUnequal(d, r2, inverseRoot(d, r2), own, other, inverse, F, C);
     }
 };
 

@@ -24,8 +24,9 @@ template <class Real> CpuMixturePairs<Real>::CpuMixturePairs(const Plan& plan, i
         selfOf.push_back(Real(table.self(a) / (scale * scale)));
         scaleOf.push_back(Real(scale));
         inverseOf.push_back(Real(1 / scale));
+        curvatureOf.push_back(Real(1 / a));
     }
-    for (std::vector<Real>* array : {&radiusOf, &inverseOf})
+    for (std::vector<Real>* array : {&radiusOf, &inverseOf, &curvatureOf})
         array->resize(std::max(radii.size(), size_t(MIXTURE_CLASSES)));
     for (double a : mixture.particleRadii())
         kindOf.push_back(
@@ -92,8 +93,8 @@ void CpuMixturePairs<Real>::place(const std::vector<int>& particleAt, int from, 
 }
 
 template <class Real> MixturePairs<Real> CpuMixturePairs<Real>::pairs() const {
-    return {reach.data(), kind.data(), radiusOf.data(), inverseOf.data(),
-            Real(rc),     degree,      basis,           weights.data()};
+    return {reach.data(),        kind.data(), radiusOf.data(), inverseOf.data(), curvatureOf.data(),
+            Real(2 / (rc * rc)), degree,      basis,           weights.data()};
 }
 
 /** The polynomials of the pairs of place i: P_n = sum over m of c_m(ai) (polynomial m, n). */

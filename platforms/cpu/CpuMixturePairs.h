@@ -48,7 +48,7 @@ private:
     double rc, largestReach, growth;
     int degree, basis; ///< see MixturePairs
     /// of each distinct radius, MIXTURE_CLASSES at least; self of the scaled M_R
-    std::vector<Real> radiusOf, reachOf, selfOf, scaleOf, inverseOf;
+    std::vector<Real> radiusOf, reachOf, selfOf, scaleOf, inverseOf, curvatureOf;
     std::vector<int32_t> kindOf; ///< of each particle
     /// of few radii: [radius][F, C][degree + 1][MIXTURE_CLASSES]; of many: [m][F, C][degree +
     /// 1][basis], to be combined for each row

@@ -37,11 +37,6 @@ struct CellInterval {
         from = (number == count ? 0 : (low >= count ? low - count : low));
     }
     int cell(int i) const { return from + i < count ? from + i : from + i - count; }
-    /** Lower bound of the squared distance from s to cell i, for a box of this width. */
-    double squaredDistance(int i, double s, double width) const {
-        const double outside = way(i, s);
-        return outside * outside * (width / count) * (width / count);
-    }
     /** From s to the nearest end of cell i, in cells; 0 within. */
     double way(int i, double s) const {
         const double below = low + i - (s + 1) * count;
@@ -141,6 +136,8 @@ template <class Real> void CpuRealSpace<Real>::prepareCells(int particles) {
         for (int d = 0; d < 2; d++)
             cellCount[d] = (cellCount[d] + 1) / 2;
     cellCount[2] = std::min(cellCount[2], std::max(1, most / (cellCount[0] * cellCount[1])));
+    for (int d = 0; d < 2; d++)
+        cellSize[d] = (tilted ? 1 : width[d]) / cellCount[d];
 }
 
 template <class Real>
@@ -179,26 +176,29 @@ int CpuRealSpace<Real>::findRuns(const Vec3& s, double share, PairRun* runs) con
     const int end = z.from + z.number, last = std::min(end, cellCount[2]),
               wrapped = std::max(end - cellCount[2], 0);
     const double most = (1 + 2 * MARGIN) * own * own;
-    double y2[MOST_CELLS], wayY[MOST_CELLS];
+    double wayY[MOST_CELLS];
+    const int* columns[MOST_CELLS]; // of the first row
     for (int j = 0; j < y.number; j++) {
-        y2[j] = y.squaredDistance(j, s[1], width[1]);
-        wayY[j] = y.way(j, s[1]) / y.count;
+        wayY[j] = y.way(j, s[1]) * cellSize[1];
+        columns[j] = cellStart.data() + y.cell(j) * cellCount[2];
     }
     int n = 0;
     for (int i = 0; i < x.number; i++) {
-        const double left = most - x.squaredDistance(i, s[0], width[0]);
-        const double wayX = x.way(i, s[0]) / x.count;
-        const int* const row = cellStart.data() + size_t(x.cell(i)) * cellCount[1] * cellCount[2];
+        const double wayX = x.way(i, s[0]) * cellSize[0], left = most - wayX * wayX;
+        const size_t row = size_t(x.cell(i)) * cellCount[1] * cellCount[2];
         for (int j = 0; j < y.number; j++) {
-            // a corner column that is out of range
-            if (tilted ? wayX * wayY[j] != 0 &&
-                             squaredDistanceOfCorner(planeMetric, wayX, wayY[j]) >= most
-                       : y2[j] >= left)
-                continue;
-            const int* const start = row + y.cell(j) * cellCount[2];
-            runs[n++] = {start[z.from], start[last]};
-            if (wrapped > 0)
-                runs[n++] = {start[0], start[wrapped]};
+            // a corner column may be out of range: hard to predict, so its runs are overwritten
+            const bool near = tilted
+                                  ? wayX * wayY[j] == 0 ||
+                                        squaredDistanceOfCorner(planeMetric, wayX, wayY[j]) < most
+                                  : wayY[j] * wayY[j] < left;
+            const int* const start = columns[j] + row;
+            runs[n] = {start[z.from], start[last]};
+            n += near;
+            if (wrapped > 0) {
+                runs[n] = {start[0], start[wrapped]};
+                n += near;
+            }
         }
     }
     return n;
@@ -217,7 +217,7 @@ template <class Real>
 void CpuRealSpace<Real>::fillRowsOf(int task, int thread, const std::vector<Vec3>& fractions) {
     const PairPolynomials<Real> table = polynomials();
     const PairGeometry<Real> positions = geometry();
-    PairRun runs[2 * MOST_CELLS * MOST_CELLS];
+    PairRun runs[2 * MOST_CELLS * MOST_CELLS + 1];
     std::vector<PairBlock<Real>>& mine = blocks[task];
     const int from = Threads::from(task), to = Threads::to(task, static_cast<int>(rowStart.size()));
     int used = 0;

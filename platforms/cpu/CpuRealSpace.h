@@ -77,6 +77,8 @@ private:
     std::vector<Real> coefficientsF, coefficientsC;
     double reach[3];  ///< of the range, in fractions of the box
     int cellCount[3]; ///< cells along the box vectors
+    /// along the first two, in coordinates along box vectors if the box is tilted, else in nm
+    double cellSize[2];
     std::vector<int> particleAt, cellOf, cellStart;
     std::vector<typename PairCoordinate<Real>::Type> axes[3];
     std::vector<std::vector<PairBlock<Real>>> blocks; ///< one array per task of Threads::runBlocks

@@ -28,7 +28,7 @@ HWY_INLINE hn::Vec<D> chosen(D d, const Real* HWY_RESTRICT numbers, Indices kind
 }
 
 /** What pairs with lanes of spheres of these kinds need to know of them. */
-template <class D> struct OtherSpheres { hn::Vec<D> radius, inverse, waveF, waveC; };
+template <class D> struct OtherSpheres { hn::Vec<D> radius, inverse, curvature, waveF, waveC; };
 
 /** Each with its own polynomial out of a few. */
 template <class D, class Real, class V = hn::Vec<D>>
@@ -41,7 +41,8 @@ HWY_INLINE OtherSpheres<D> ofClasses(D d, const MixturePairs<Real>& pairs,
         F = hn::MulAdd(F, t, chosen(d, table.F + power * MIXTURE_CLASSES, kinds));
         C = hn::MulAdd(C, t, chosen(d, table.C + power * MIXTURE_CLASSES, kinds));
     }
-    return {chosen(d, pairs.radius, kinds), chosen(d, pairs.inverse, kinds), F, C};
+    return {chosen(d, pairs.radius, kinds), chosen(d, pairs.inverse, kinds),
+            chosen(d, pairs.curvature, kinds), F, C};
 }
 
 /** Each with weights of the basis functions. */
@@ -50,12 +51,13 @@ HWY_INLINE OtherSpheres<D> ofBasis(D d, const MixturePairs<Real>& pairs,
                                    const MixtureRow<Real>& table, const Kind<Real>* HWY_RESTRICT of,
                                    V t) {
     constexpr int MOST = 64; // more than MixtureTable::MOST_BASIS
-    Real weights[MOST * PAIR_LANES], radius[PAIR_LANES], inverse[PAIR_LANES];
+    Real weights[MOST * PAIR_LANES], radius[PAIR_LANES], inverse[PAIR_LANES], curvature[PAIR_LANES];
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (int lane = 0; lane < lanes; lane++) {
         const Real* own = pairs.weights + size_t(of[lane]) * pairs.basis;
         radius[lane] = pairs.radius[of[lane]];
         inverse[lane] = pairs.inverse[of[lane]];
+        curvature[lane] = pairs.curvature[of[lane]];
         for (int n = 0; n < pairs.basis; n++)
             weights[n * lanes + lane] = own[n];
     }
@@ -71,7 +73,7 @@ HWY_INLINE OtherSpheres<D> ofBasis(D d, const MixturePairs<Real>& pairs,
         F = hn::MulAdd(F, t, ownF);
         C = hn::MulAdd(C, t, ownC);
     }
-    return {hn::LoadU(d, radius), hn::LoadU(d, inverse), F, C};
+    return {hn::LoadU(d, radius), hn::LoadU(d, inverse), hn::LoadU(d, curvature), F, C};
 }
 
 /** Scaled F and C of one block of particle i; lanes from `used` on count for nothing. */
@@ -84,7 +86,7 @@ HWY_INLINE void evaluateBlock(const MixturePairs<Real>& pairs, const MixtureRow<
         kinds[k] = pairs.kind[found[k]];
     const int own = pairs.kind[i];
     const auto ai = hn::Set(d, pairs.radius[own]), inverse = hn::Set(d, pairs.inverse[own]);
-    const auto scale = hn::Set(d, Real(2 / (double(pairs.rc) * pairs.rc)));
+    const auto curvature = hn::Set(d, pairs.curvature[own]), scale = hn::Set(d, pairs.scale);
     for (int k = 0; k < PAIR_LANES; k += static_cast<int>(hn::Lanes(d))) {
         const auto dx = hn::LoadU(d, p.dx + k), dy = hn::LoadU(d, p.dy + k),
                    dz = hn::LoadU(d, p.dz + k);
@@ -94,8 +96,8 @@ HWY_INLINE void evaluateBlock(const MixturePairs<Real>& pairs, const MixtureRow<
         const auto safe2 = hn::Max(r2, hn::Set(d, Real(SMALLEST_R2<Real>)));
         const auto other = CLASSES ? ofClasses(d, pairs, table, kinds + k, t)
                                    : ofBasis(d, pairs, table, kinds + k, t);
-        rpyOfUnequal(d, safe2, hn::Div(hn::Set(d, Real(1)), hn::Sqrt(safe2)), ai, other.radius, F,
-                     C);
+        rpyOfUnequal(d, safe2, hn::Div(hn::Set(d, Real(1)), hn::Sqrt(safe2)), ai, other.radius,
+                     hn::Mul(curvature, other.curvature), F, C);
         const int left = used - k; // in these lanes
         const auto inUse = hn::FirstN(d, left > 0 ? size_t(left) : 0);
         const auto both = hn::IfThenElseZero(inUse, hn::Mul(inverse, other.inverse));

@@ -18,11 +18,12 @@ constexpr int MIXTURE_CLASSES = 8;
  * place can be read up to PAIR_LANES places beyond their ends.
  */
 template <class Real> struct MixturePairs {
-    const Real* reach;   ///< [n], in radii of the Plan; a pair ends at the sum of reaches
-    const int32_t* kind; ///< [n] index of the distinct radius
-    const Real* radius;  ///< [distinct radii, MIXTURE_CLASSES at least]
-    const Real* inverse; ///< the same, what F and C are multiplied by for either sphere [T55]
-    Real rc;
+    const Real* reach;     ///< [n], in radii of the Plan; a pair ends at the sum of reaches
+    const int32_t* kind;   ///< [n] index of the distinct radius
+    const Real* radius;    ///< [distinct radii, MIXTURE_CLASSES at least]
+    const Real* inverse;   ///< the same, what F and C are multiplied by for either sphere [T55]
+    const Real* curvature; ///< the same, 1/radius
+    Real scale;            ///< 2/rc^2
     int degree;
     int basis;           ///< number of basis functions; 0: one for each distinct radius
     const Real* weights; ///< [distinct radii][basis] c_n

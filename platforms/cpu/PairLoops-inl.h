@@ -8,6 +8,7 @@
 #define OPENMMPSE_PAIRLOOPS_INL_H_
 #endif
 
+#include "LaneNumbers-inl.h"
 #include "PairKernels.h"
 #include <hwy/highway.h>
 #include <type_traits>
@@ -92,7 +93,7 @@ HWY_INLINE void storeChosen(D d, Mask in, Index j, hn::Vec<D> dx, hn::Vec<D> dy,
     if constexpr (sizeof(Index) == 4)
         storeIndices(di, hn::Add(lanes, hn::Set(di, j)), out.found + n);
     else
-        storeIndices(di, hn::TableLookupLanes(hn::Iota(di, j), order), out.found + n);
+        storeIndices(di, hn::TableLookupLanes(lanesFrom(di, j), order), out.found + n);
     hn::StoreU(hn::TableLookupLanes(dx, order), d, out.dx + n);
     hn::StoreU(hn::TableLookupLanes(dy, order), d, out.dy + n);
     hn::StoreU(hn::TableLookupLanes(dz, order), d, out.dz + n);
@@ -141,7 +142,7 @@ HWY_INLINE int findNeighbours(const PairGeometry<Real>& g, int i, SquaredRange r
             displacement.of(loadCoordinates(d, g.x + j), loadCoordinates(d, g.y + j),
                             loadCoordinates(d, g.z + j), dx, dy, dz);
             const auto r2 = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
-            const auto index = hn::Iota(di, Index(j));
+            const auto index = lanesFrom(di, Index(j));
             const auto candidate =
                 hn::And(hn::Lt(index, hn::Set(di, Index(queue.end[v]))), hn::Ne(index, self));
             const auto in = hn::And(hn::RebindMask(di, hn::Lt(r2, range2(d, j))), candidate);

@@ -24,9 +24,10 @@ template <class Real> constexpr double SMALLEST_R2 = sizeof(Real) == 4 ? 1e-20 :
  * the other [T24], by selection: what is not chosen may overflow.
  * @param r2  squared distance, at least SMALLEST_R2
  * @param s   its inverse root
+ * @param inverse  1/(ai aj)
  */
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE void rpyOfUnequal(D d, V r2, V s, V ai, V aj, V& F, V& C) {
+HWY_INLINE void rpyOfUnequal(D d, V r2, V s, V ai, V aj, V inverse, V& F, V& C) {
     using Real = hn::TFromD<D>;
     const auto constant = [&](double value) { return hn::Set(d, Real(value)); };
     const auto s2 = hn::Mul(s, s);
@@ -36,7 +37,6 @@ HWY_INLINE void rpyOfUnequal(D d, V r2, V s, V ai, V aj, V& F, V& C) {
     const auto apartF = hn::Mul(s, hn::Add(squares, constant(0.75)));
     const auto apartC = hn::Mul(s, hn::NegMulAdd(constant(3), squares, constant(0.75)));
     // of overlapping spheres, times ai aj
-    const auto inverse = hn::Div(constant(1), hn::Mul(ai, aj));
     const auto scale = hn::Mul(constant(1.0 / 32), hn::Mul(s, s2));
     const auto skew = hn::MulAdd(constant(3), r2, difference2), gap = hn::Sub(difference2, r2);
     const auto partF =

@@ -9,6 +9,7 @@
 #define HWY_TARGET_INCLUDE "SphereKernels.cpp"
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
+#include "LaneNumbers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -46,7 +47,7 @@ template <class Real> struct SpherePlane {
 /** Weights of points from z0 on, counted from the middle of a row that takes `taken` of t. */
 template <class D, class Real = hn::TFromD<D>>
 HWY_INLINE hn::Vec<D> weightsAt(D d, const SpherePlane<Real>& plane, Real taken, Real z0) {
-    const auto one = hn::Set(d, Real(1)), dz = hn::Iota(d, z0);
+    const auto one = hn::Set(d, Real(1)), dz = lanesFrom(d, z0);
     const auto t = hn::MulAdd(hn::Mul(hn::Set(d, plane.point), dz), dz, hn::Set(d, taken)),
                capped = hn::Min(t, one); // its powers stay finite
     auto w = hn::Set(d, plane.coefficients[0]);
@@ -136,7 +137,7 @@ HWY_INLINE void evaluateRows(D d, const GridSpheres<Real>& g, const RowQueue<Rea
     const Real* coefficients[N];
     hn::Vec<D> t[N], capped[N];
     for (int n = 0; n < N; n++) {
-        const auto dz = hn::Iota(d, queue.z0[from + n]);
+        const auto dz = lanesFrom(d, queue.z0[from + n]);
         t[n] = hn::MulAdd(hn::Mul(hn::Set(d, queue.point[from + n]), dz), dz,
                           hn::Set(d, queue.taken[from + n]));
         capped[n] = hn::Min(t[n], one);
@@ -183,7 +184,7 @@ HWY_INLINE void queuePlane(D d, const GridSpheres<Real>& g, int particle, int dx
     for (int dy = 0; dy < extent; dy += lanes) {
         if (queue.count > RowQueue<Real>::MOST)
             workOff(d, g, queue, work);
-        const auto y = hn::Iota(d, offset[1] + dy),
+        const auto y = lanesFrom(d, offset[1] + dy),
                    fromMiddle = hn::Sub(y, hn::Set(d, plane.middle));
         const auto taken = hn::MulAdd(hn::Mul(hn::Set(d, plane.line), fromMiddle), fromMiddle,
                                       hn::Set(d, 1 - plane.left));
@@ -191,8 +192,7 @@ HWY_INLINE void queuePlane(D d, const GridSpheres<Real>& g, int particle, int dx
             hn::NegMulAdd(hn::Set(d, g.skewZ), y, hn::Set(d, offset[2] - g.skewX * plane.x));
         const auto in =
             hn::And(hn::Lt(taken, hn::Set(d, Real(1))), hn::FirstN(d, size_t(extent - dy)));
-        // the first number is constant: others are built in memory
-        auto row = hn::Add(hn::Iota(di, Index(0)), hn::Set(di, Index(first[1] + dy)));
+        auto row = lanesFrom(di, Index(first[1] + dy));
         const auto size = hn::Set(di, Index(g.size[1]));
         row = hn::IfThenElse(hn::Lt(row, size), row, hn::Sub(row, size));
         const auto at =
@@ -278,7 +278,7 @@ void weighRowsOf(const GridSpheres<Real>& g, int from, int to, Real* alongWeight
         Real* HWY_RESTRICT out = alongWeights + size_t(particle) * TERMS * SPHERE_LANES;
         const Real* HWY_RESTRICT along = g.along + size_t(kind) * TERMS * (g.rowDegree + 1);
         for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-            const auto z = hn::Iota(d, g.offset[3 * size_t(particle) + 2] + k);
+            const auto z = lanesFrom(d, g.offset[3 * size_t(particle) + 2] + k);
             const auto t = hn::MulSub(hn::Mul(hn::Set(d, scale * g.point), z), z, one);
             hn::Vec<decltype(d)> terms[TERMS];
             evaluateTerms<TERMS>(d, along, g.rowDegree, hn::Min(t, one), terms);
@@ -307,7 +307,7 @@ template <int TERMS, class Real> struct RowsOfPlane {
         const auto taken = hn::Set(d, scale * g.plane * x * x - 1);
         const Real* HWY_RESTRICT across = g.across + size_t(kind) * TERMS * (g.rowDegree + 1);
         for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-            const auto y = hn::Iota(d, offset[1] + k);
+            const auto y = lanesFrom(d, offset[1] + k);
             const auto t = hn::MulAdd(hn::Mul(hn::Set(d, scale * g.line), y), y, taken);
             const auto in = hn::Lt(t, one);
             const int inside = static_cast<int>(hn::CountTrue(d, in));
@@ -480,6 +480,8 @@ void gatherOf(const GridSpheres<Real>& g, int from, int to, const Real* const gr
 template <class Work> HWY_INLINE void forTerms(int terms, Work work) {
     if (terms <= LEAST_ROW_TERMS)
         work.template run<LEAST_ROW_TERMS>();
+    else if (terms == LEAST_ROW_TERMS + 1)
+        work.template run<LEAST_ROW_TERMS + 1>();
     else
         work.template run<MOST_ROW_TERMS>();
 }

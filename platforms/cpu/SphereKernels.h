@@ -22,7 +22,7 @@ template <class Real> struct SphereShape {
 };
 
 /// terms of such sums
-constexpr int LEAST_ROW_TERMS = 4, MOST_ROW_TERMS = 5;
+constexpr int LEAST_ROW_TERMS = 3, MOST_ROW_TERMS = 5;
 
 /** Unequal spheres on the grid, sorted by the column (x, y) of their first grid point. */
 template <class Real> struct GridSpheres {

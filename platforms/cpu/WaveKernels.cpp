@@ -7,6 +7,7 @@
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 #include <hwy/contrib/math/math-inl.h>
+#include "LaneNumbers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -131,7 +132,7 @@ HWY_INLINE void scaleRow(const WaveColumns<Real>& columns, int nx, const Real* H
     const auto zero = hn::Zero(d), force = hn::Set(d, Real(columns.forced ? 1 : 0));
     for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
         const auto D = hn::LoadU(d, factors + i);
-        const auto nz = hn::Iota(d, Real(columns.firstZ + int(i)));
+        const auto nz = lanesFrom(d, Real(columns.firstZ + int(i)));
         hn::Vec<decltype(d)> k[3], re[3], im[3];
         for (int c = 0; c < 3; c++)
             k[c] = hn::MulAdd(hn::Set(d, b[3 * c + 2]), nz,
@@ -186,7 +187,7 @@ bool fillFactorsAny(const FactorColumns<Real>& columns, Real* HWY_RESTRICT facto
         const int nx = (2 * x <= columns.sizeX ? x : x - columns.sizeX);
         const auto along = hn::Set(d, columns.inverseX[x] * columns.inverseY);
         for (size_t i = 0; i < LANES; i += hn::Lanes(d)) {
-            const auto nz = hn::Iota(d, Real(columns.firstZ + int(i)));
+            const auto nz = lanesFrom(d, Real(columns.firstZ + int(i)));
             auto k2 = zero;
             for (int c = 0; c < 3; c++) {
                 const auto k = hn::MulAdd(hn::Set(d, b[3 * c + 2]), nz,
