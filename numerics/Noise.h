@@ -46,6 +46,26 @@ template <class Real> inline void particleNoise(const NoiseKey& key, uint32_t pa
 }
 
 /**
+ * The same for n particles, in double precision: the random words of many come first, so that their
+ * long chains of dependent operations overlap.
+ * @param z  [n]
+ */
+template <class Index>
+inline void particleNoise(const NoiseKey& key, const Index* particles, int n, double (*z)[3]) {
+    constexpr int TOGETHER = 16;
+    uint32_t words[TOGETHER][4];
+    for (int from = 0; from < n; from += TOGETHER) {
+        const int count = (n - from < TOGETHER ? n - from : TOGETHER);
+        for (int i = 0; i < count; i++)
+            inDouble::indexWords(key.seed, uint32_t(key.stream), uint32_t(key.counter),
+                                 uint32_t(key.counter >> 32), uint32_t(particles[from + i]), 0,
+                                 words[i]);
+        for (int i = 0; i < count; i++)
+            inDouble::particleNormals(words[i], z[from + i]);
+    }
+}
+
+/**
  * Three complex normal numbers for a mode n, E[z z*] = 1 each (real and imaginary part of variance
  * 1/2), and z(-n) = z(n)* exactly.
  */

@@ -172,6 +172,13 @@ DEVICE void indexWords(unsigned int seed, unsigned int stream, unsigned int coun
     philox(words, seed, stream);
 }
 
+/** Three standard normal numbers z[3] of a particle, from its random words. */
+DEVICE void particleNormals(const unsigned int* words, real* z) {
+    real unused;
+    boxMuller(words[0], words[1], &z[0], &z[1]);
+    boxMuller(words[2], words[3], &z[2], &unused);
+}
+
 /**
  * Three standard normal numbers z[3] for a particle, by its index in the System. The counter has 48
  * bits.
@@ -179,10 +186,8 @@ DEVICE void indexWords(unsigned int seed, unsigned int stream, unsigned int coun
 DEVICE void particleNoise(unsigned int seed, unsigned int stream, unsigned int counterLow,
                           unsigned int counterHigh, unsigned int particle, real* z) {
     unsigned int words[4];
-    real unused;
     indexWords(seed, stream, counterLow, counterHigh, particle, 0, words);
-    boxMuller(words[0], words[1], &z[0], &z[1]);
-    boxMuller(words[2], words[3], &z[2], &unused);
+    particleNormals(words, z);
 }
 
 /**

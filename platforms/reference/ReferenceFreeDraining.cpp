@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ReferenceFreeDraining.h"
+#include <algorithm>
 
 using namespace PSE::numerics;
 
@@ -19,11 +20,14 @@ void ReferenceFreeDraining::computeVelocities(const std::vector<Vec3>* forces,
     clock.start();
     u.resize(mobility.size());
     const double unit = (thermal == NULL ? 0 : std::sqrt(2 * thermal->kT / thermal->dt));
-    for (size_t i = 0; i < mobility.size(); i++) {
-        Vec3 z = Vec3::Zero();
-        if (thermal != NULL)
-            particleNoise(thermal->real, indices[i], z.data());
-        u[i] = unit * root[i] * z;
+    static_assert(sizeof(Vec3) == 3 * sizeof(double), "an array of them is one of numbers");
+    const int n = static_cast<int>(mobility.size());
+    if (thermal != NULL)
+        particleNoise(thermal->real, indices.data(), n, reinterpret_cast<double(*)[3]>(u.data()));
+    else
+        std::fill(u.begin(), u.end(), Vec3::Zero());
+    for (int i = 0; i < n; i++) {
+        u[i] = unit * root[i] * u[i];
         if (forces != NULL)
             u[i] += mobility[i] * (*forces)[i];
     }
