@@ -263,7 +263,7 @@ void PSEBrownianIntegrator::stateChanged(State::DataType changed) {
         return;
     positionsSet = true;
     if (context != NULL)
-        kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
+        kernel.getAs<IntegratePSEStepKernel>().positionsSet();
 }
 
 void PSEBrownianIntegrator::cleanup() {
@@ -358,7 +358,7 @@ void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
 
 void PSEBrownianIntegrator::loadCheckpoint(std::istream& stream) {
     // Positions are the checkpoint's by now, even if the rest of it is refused.
-    kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
+    kernel.getAs<IntegratePSEStepKernel>().positionsSet();
     kernel.getAs<IntegratePSEStepKernel>().loadCheckpoint(stream);
 }
 

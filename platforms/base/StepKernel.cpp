@@ -29,6 +29,10 @@ constexpr double FARTHEST = 1e9;
 /// Radii that rounding of a coordinate may be, in an unbounded fluid: 1e-7 at 1e9 radii from the
 /// origin in double precision; in single precision a tenth at 2e6.
 constexpr double FINEST_PLACE = 1e-7, COARSEST_PLACE = 0.1, SINGLE_EPSILON = 1e-8;
+/// Radii that a growing step may be long, in an unbounded fluid [T63].
+constexpr double LONGEST_STEP = 1e3;
+/// Minus the cosine between a step of such a growth and the one before, at least.
+constexpr double REVERSED = 0.9;
 constexpr uint64_t LARGEST_COUNTER = uint64_t(1) << 48;
 /// A box that moves is planned with this room for longer and for shorter vectors [T37].
 constexpr double GROWTH = 1.03, SHRINKAGE = 0.97;
@@ -327,9 +331,9 @@ double PlannedStepKernel::farthestPosition() const {
     return FARTHEST * currentBox().vectors().diagonal().maxCoeff();
 }
 
-void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position) const {
+void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position, bool next) const {
     std::ostringstream message;
-    message << "PSEBrownianIntegrator: particle " << particle << " is "
+    message << "PSEBrownianIntegrator: particle " << particle << (next ? " would be " : " is ")
             << position.cwiseAbs().maxCoeff() << " nm from the origin, more than ";
     if (unboundedPlan)
         message << farthestPosition() << " nm, and its distance to a neighbour is lost to "
@@ -339,6 +343,54 @@ void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position) const 
                 << "positions nearer to the box";
     message << ", and if steps have brought it there, use a smaller step size";
     throw OpenMMException(message.str());
+}
+
+double PlannedStepKernel::longestStep() const {
+    if (!scene.periodicBox)
+        return LONGEST_STEP * *std::max_element(scene.radii.begin(), scene.radii.end());
+    const Lattice box = currentBox();
+    return std::max({box.length(0), box.length(1), box.length(2)});
+}
+
+bool PlannedStepKernel::mayBlowUp(double velocity, double dt) const {
+    return growth.isRunaway(velocity, dt) && dt * velocity > longestStep();
+}
+
+void PlannedStepKernel::refuseBlowUp(ContextImpl& context,
+                                     const std::vector<OfParticle>& velocities, double dt) const {
+    std::vector<OmmVec3> before;
+    context.getVelocities(before);
+    const OfParticle* fastest = &velocities.at(0);
+    double along = 0, square = 0, squareBefore = 0;
+    for (const OfParticle& entry : velocities) {
+        const Vec3 last = fromOpenMM(before[entry.first]);
+        along += entry.second.dot(last);
+        square += entry.second.squaredNorm();
+        squareBefore += last.squaredNorm();
+        if (entry.second.squaredNorm() > fastest->second.squaredNorm())
+            fastest = &entry;
+    }
+    if (along > -REVERSED * std::sqrt(square * squareBefore))
+        return;
+    std::ostringstream message;
+    message << "PSEBrownianIntegrator: the step size of " << dt
+            << " ps is too long for the forces: "
+            << "particle " << fastest->first << " would move by " << dt * fastest->second.norm()
+            << " nm, more than " << longestStep()
+            << (scene.periodicBox ? " nm (the longest box vector)"
+                                  : " nm (1000 of the largest radius)")
+            << ", back over its last step, and the largest velocity has grown in each of the last "
+            << growth.length() + 1 << " steps, by a factor of "
+            << fastest->second.cwiseAbs().maxCoeff() / growth.start()
+            << " in all; this step is not made. Use a smaller step size (in Python, "
+            << "openmmpse.accuracy.recommendStep finds one), from a state of before that";
+    throw OpenMMException(message.str());
+}
+
+void PlannedStepKernel::positionsSet() {
+    if (!straining) // which ends with everything as it was
+        growth.forget();
+    positionsChanged();
 }
 
 Thermal PlannedStepKernel::thermal(const PSEBrownianIntegrator& integrator, bool sample) const {

@@ -9,6 +9,7 @@
 #include "Thermal.h"
 #include "VectorConversion.h"
 #include "numerics/Plan.h"
+#include "numerics/StepGrowth.h"
 #include "numerics/UnboundedPlan.h"
 #include "openmmpse/PSEKernels.h"
 #include <memory>
@@ -37,6 +38,7 @@ public:
     using IntegratePSEStepKernel::IntegratePSEStepKernel;
     void initialize(OpenMM::ContextImpl& context, const PSEBrownianIntegrator& integrator,
                     const Scene& scene) override;
+    void positionsSet() override;
     NumericalParameters getNumericalParameters() const override;
     std::vector<StageTime> getStageTimes() const override { return clock.times(); }
     void createCheckpoint(std::ostream& stream) const override;
@@ -98,8 +100,27 @@ protected:
      * @throws OpenMMException naming a box that is not one, before positions are blamed for it
      */
     double farthestPosition() const;
-    /** Refuse a position beyond farthestPosition(). @throws OpenMMException always */
-    [[noreturn]] void refuseFarAway(int particle, const numerics::Vec3& position) const;
+    /**
+     * Refuse a position beyond farthestPosition().
+     * @param next  whether it is that after the step, which is not made
+     * @throws OpenMMException always
+     */
+    [[noreturn]] void refuseFarAway(int particle, const numerics::Vec3& position,
+                                    bool next = false) const;
+    /** An index in the System and three numbers. */
+    using OfParticle = std::pair<int, numerics::Vec3>;
+    /**
+     * Whether a step may be one of a growth that explicit steps make where they are too long for
+     * the forces [T63].
+     * @param velocity  the largest component (nm/ps) of all particles, without the flow
+     */
+    bool mayBlowUp(double velocity, double dt) const;
+    /**
+     * Refuse that step if it is one.
+     * @param velocities  of mobile particles (nm/ps), without the flow
+     */
+    void refuseBlowUp(OpenMM::ContextImpl& context, const std::vector<OfParticle>& velocities,
+                      double dt) const;
 
     Scene scene;
     std::vector<double> masses; ///< of all particles
@@ -107,6 +128,7 @@ protected:
     StageClock clock;
     uint64_t steps = 0, samples = 0; ///< thermal steps taken, samples drawn
     double strain = 0;               ///< so far
+    numerics::StepGrowth growth;     ///< of the largest velocity, from step to step
 
 private:
     /** A Plan and what it was made for. */
@@ -115,6 +137,8 @@ private:
         numerics::Plan plan;
     };
     numerics::Lattice currentBox() const;
+    /** Displacement in a step (nm) beyond which forces of the next say nothing of the last ones. */
+    double longestStep() const;
     /** (1/V) dU/d(strain) [T47]. */
     numerics::Matrix3 interparticleStress(OpenMM::ContextImpl& context, int groups);
     /** What must be planned for before a step in that box; nothing if the present Plan serves. */

@@ -247,6 +247,7 @@ void CommonStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator
     checkStep(context, dt, strained);
     engine->move(dt);
     travelled += dt * engine->largestVelocity() + farthestFlow(strained);
+    growth.add(engine->largestVelocity(), dt);
     if (strained != 0)
         flowAlong(strained, dt);
     strain += strained;
@@ -286,6 +287,8 @@ void CommonStepKernel::checkStep(ContextImpl& context, double dt, double straine
         refuseForce(context);
     if (!std::isfinite(engine->largestVelocity()))
         refuseVelocity();
+    if (mayBlowUp(engine->largestVelocity(), dt))
+        refuseBlowUp(context, engine->velocities(), dt);
     const double largest = realIsDouble(device) ? std::numeric_limits<double>::max()
                                                 : std::numeric_limits<float>::max();
     const double farthest = std::min(largest, farthestPosition());

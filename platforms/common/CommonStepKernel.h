@@ -65,8 +65,6 @@ private:
     double farthestFlow(double strain) const;
     void checkStep(OpenMM::ContextImpl& context, double dt, double strain) const;
     [[noreturn]] void refuseForce(OpenMM::ContextImpl& context) const;
-    /** An index in the System and three numbers. */
-    using OfParticle = std::pair<int, numerics::Vec3>;
     OfParticle firstBeyond(const std::vector<OfParticle>& all, double limit) const;
     [[noreturn]] void refuseVelocity() const;
     void refuseMove(OpenMM::ContextImpl& context, double dt, double strain, double limit) const;

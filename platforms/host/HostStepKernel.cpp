@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "HostStepKernel.h"
 #include "openmm/internal/ContextImpl.h"
+#include <algorithm>
 #include <cmath>
 
 using namespace PSE::numerics;
@@ -61,16 +62,39 @@ vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double sca
     return all;
 }
 
-void HostStepKernel::requireFinite(const vector<Vec3>& values,
-                                   const CheckedQuantity& quantity) const {
-    Vec3 sum = Vec3::Zero();
-    for (const Vec3& value : values)
+double HostStepKernel::requireFinite(const vector<Vec3>& values,
+                                     const CheckedQuantity& quantity) const {
+    Vec3 sum = Vec3::Zero(), largest = Vec3::Zero();
+    for (const Vec3& value : values) {
         sum += 0.0 * value; // not a number as soon as one of them is not finite
-    if (sum == Vec3::Zero())
+        largest = largest.cwiseMax(value.cwiseAbs());
+    }
+    if (sum != Vec3::Zero())
+        for (size_t i = 0; i < values.size(); i++)
+            if (!values[i].allFinite())
+                refuseNotFinite(quantity, scene.mobile[i], values[i]);
+    return largest.maxCoeff();
+}
+
+double HostStepKernel::checkedVelocities(ContextImpl& context, double dt) const {
+    const double largest = requireFinite(velocities, VELOCITY);
+    if (mayBlowUp(largest, dt)) {
+        vector<OfParticle> all;
+        for (size_t i = 0; i < velocities.size(); i++)
+            all.emplace_back(scene.mobile[i], velocities[i]);
+        refuseBlowUp(context, all, dt);
+    }
+    return largest;
+}
+
+void HostStepKernel::checkNextPositions() const {
+    const double farthest = farthestPosition();
+    if (requireFinite(positions, NEXT_POSITION) <= farthest)
         return;
-    for (size_t i = 0; i < values.size(); i++)
-        if (!values[i].allFinite())
-            refuseNotFinite(quantity, scene.mobile[i], values[i]);
+    size_t i = 0;
+    while (positions[i].cwiseAbs().maxCoeff() <= farthest)
+        i++;
+    refuseFarAway(scene.mobile[i], positions[i], true);
 }
 
 void HostStepKernel::checkPositions(ContextImpl&) {
@@ -116,14 +140,13 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
     followPositions();
     const Thermal noise = thermal(integrator, false);
     engine->computeVelocities(&forces, noise.kT > 0 ? &noise : NULL, velocities);
-    requireFinite(velocities, VELOCITY);
-
-    const double dt = integrator.getStepSize(), flow = strainOf(data.time, dt);
+    const double dt = integrator.getStepSize(), fastest = checkedVelocities(context, dt),
+                 flow = strainOf(data.time, dt);
     if (flow != 0)
         addFlow(flow, dt);
     for (size_t i = 0; i < velocities.size(); i++)
         positions[i] += dt * velocities[i];
-    requireFinite(positions, NEXT_POSITION);
+    checkNextPositions();
     if (flow != 0 && scene.periodicBox) {
         const Matrix3 box = shearedBox(flow).vectors();
         context.setPeriodicBoxVectors(toOpenMM(box.col(0)), toOpenMM(box.col(1)),
@@ -137,6 +160,7 @@ void HostStepKernel::execute(ContextImpl& context, const PSEBrownianIntegrator& 
     if (flow != 0)
         factory->followBox(*data.positions, data.periodicBoxVectors);
     strain += flow;
+    growth.add(fastest, dt);
     data.time += dt;
     data.stepCount++;
     steps++;

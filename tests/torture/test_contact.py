@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Contacts: nearly hard spheres up to dense packings, gels held by strong bonds, stiff springs."""
+import re
+
 import numpy as np
 import openmm
 import pytest
 
+import openmmpse
 import scenes
 from platformnames import isDirect
 from scenes import KB, errorOf, makeContext
@@ -173,13 +176,70 @@ def testStiffSprings(platformName, hardCase):
         assert excess < 6
 
 
-@pytest.mark.onePrecision
-def testSpringsBeyondStability(platformName, hardCase):
+def overshooting(platformName, fluid, factor=3.0):
     """
-    Springs at 1.5 times the largest stable stiffness: the explicit step blows up.
+    Springs without length between spheres 20 a apart, in steps of `factor` times their relaxation time:
+    above 2, each overshoots by more than the one before.
+    """
+    pairs = 4
+    centres = scenes.randomSuspension(pairs, 0.002, scenes.cube(1), RADIUS, 735)
+    half = np.array([0.48, 0.6, 0.64])*10*RADIUS
+    scene = scenes.Scene(np.concatenate([centres.positions - half, centres.positions + half]), centres.box, RADIUS)
+    dt = 0.1*RADIUS**2/DIFFUSION
+    springs = scenes.harmonicBonds([(i, i + pairs) for i in range(pairs)], 0.0, factor/(2*scene.mu0*dt))
 
-    An exception names a particle and the remedy, before any coordinate is not a number; positions
-    set anew, the Context goes on.
+    def configure(integrator):
+        if fluid == "FreeDraining":
+            integrator.setMobilityModel(openmmpse.PSEBrownianIntegrator.FreeDraining)
+        else:
+            integrator.setFluidBoundary(getattr(openmmpse.PSEBrownianIntegrator, fluid))
+
+    return makeContext(scene, platformName, TEMPERATURE, dt, TOLERANCE, forces=[springs], configure=configure)
+
+
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("fluid", ["Periodic", "Unbounded", "FreeDraining"])
+def testSpringsBeyondStability(platformName, fluid, hardCase):
+    """
+    Stretched springs at 1.5 times the largest stable stiffness: the explicit step blows up, each
+    displacement about twice the one before.
+
+    Within 20 steps an exception names a particle, its displacement, the limit and the remedy; positions,
+    time and count are those before that step, which is refused again; with a smaller step size the run
+    goes on from there, and with positions set anew from these.
+    """
+    context, integrator = overshooting(platformName, fluid)
+    start, dt = scenes.positionsOf(context), integrator.getStepSize()
+    with pytest.raises(openmm.OpenMMException) as caught:
+        for _ in range(20):
+            before = context.getState(positions=True)
+            integrator.step(1)
+    message = str(caught.value)
+    for words in (r"particle \d would move by \d", r"more than \d", r"grown in each of the last 1\d steps",
+                  "smaller step size", "recommendStep"):
+        assert re.search(words, message), message
+    after = context.getState(positions=True)
+    positions = scenes.positionsOf(context)
+    assert np.array_equal(positions, before.getPositions(asNumpy=True)._value) and np.all(np.isfinite(positions))
+    assert (after.getTime(), after.getStepCount()) == (before.getTime(), before.getStepCount())
+    hardCase.measure(**{"farthest coordinate (nm)": float(abs(positions).max()), "steps before": after.getStepCount()})
+    with pytest.raises(openmm.OpenMMException, match="would move by"):
+        integrator.step(1)
+    integrator.setStepSize(0.3*dt)
+    integrator.step(30)
+    assert abs(scenes.positionsOf(context)).max() < 0.5*abs(positions).max()
+    integrator.setStepSize(dt)
+    context.setPositions(start)
+    integrator.step(5)
+
+
+@pytest.mark.onePrecision
+def testSpringsThatBlowUpInTime(platformName, hardCase):
+    """
+    Springs of 3 a at 1.5 times the largest stable stiffness, in equilibrium at first.
+
+    An exception names a particle and the remedy, before any coordinate is beyond 1e8 nm; positions set
+    anew, the Context goes on.
     """
     context, integrator, bonds, _ = dumbbells(3.0, platformName)
     start = scenes.positionsOf(context)
@@ -189,10 +249,66 @@ def testSpringsBeyondStability(platformName, hardCase):
     message = str(caught.value)
     assert "particle" in message and "step size" in message, message
     positions = scenes.positionsOf(context)
-    assert np.all(np.isfinite(positions))
+    assert abs(positions).max() < 1e8
     hardCase.measure(**{"farthest coordinate (nm)": float(abs(positions).max()),
                         "steps before": context.getStepCount()})
     context.setPositions(start)
     integrator.setStepSize(0.01*integrator.getStepSize())
     integrator.step(5)
     assert abs(bonds() - 3).max() < 1
+
+
+def overlapping(scene, power):
+    """kT (2a/r)^power between all pairs."""
+    force = openmm.CustomNonbondedForce(f"{KT}*({2*RADIUS}/r)^{power}")
+    force.setNonbondedMethod(force.CutoffPeriodic)
+    force.setCutoffDistance(5*RADIUS)
+    for _ in range(scene.count):
+        force.addParticle([])
+    return force
+
+
+def chainOfFene(beads):
+    """A chain nearly at its largest extension, and its bonds."""
+    longest, stiffness = 3*RADIUS, 10*KT/RADIUS**2
+    bonds = openmm.CustomBondForce(f"{-0.5*stiffness*longest**2}*log(1 - (r/{longest})^2)")
+    for i in range(beads - 1):
+        bonds.addBond(i, i + 1, [])
+    return scenes.Scene(np.outer(np.arange(beads), [0.96*longest, 0, 0]), scenes.cube(30*RADIUS), RADIUS), bonds
+
+
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("start", ["overlaps", "strained bonds", "a field that grows", "noise"])
+def testStartsThatAreHard(platformName, start, hardCase):
+    """
+    What a blow-up is not: thirty spheres at random places that repel each other with the fourth power, a
+    chain of bonds at 0.96 of their largest length, a field that doubles in each of 25 steps, one sphere in
+    steps of a hundred boxes.
+
+    No step is refused.
+    """
+    scene, forces, size, temperature = scenes.idealGas(30, 0.1, scenes.cube(1), RADIUS, 736), [], 1e-4, TEMPERATURE
+    if start == "overlaps":
+        forces = [overlapping(scene, 4)]
+    elif start == "strained bonds":
+        scene, bonds = chainOfFene(10)
+        forces = [bonds, overlapping(scene, 4)]
+    elif start == "a field that grows":
+        forces, temperature = [openmm.CustomExternalForce("-strength*x")], 0.0
+        forces[0].addGlobalParameter("strength", KT/RADIUS)
+        for i in range(scene.count):
+            forces[0].addParticle(i, [])
+    else:
+        scene, size = scenes.idealGas(1, 0.1, scenes.cube(1), RADIUS, 737), 1e5
+    context, integrator = makeContext(scene, platformName, temperature, size*RADIUS**2/DIFFUSION, 1e-2,
+                                      forces=forces)
+    longest = 0.0
+    for step in range(25 if start == "a field that grows" else 100):
+        if temperature == 0:
+            context.setParameter("strength", 2.0**step*KT/RADIUS)
+        before = scenes.positionsOf(context)
+        integrator.step(1)
+        longest = max(longest, abs(scenes.positionsOf(context) - before).max())
+    hardCase.measure(**{"longest step/box": float(longest/scene.box[0, 0])})
+    if start in ("a field that grows", "noise"):
+        assert longest > 50*scene.box[0, 0]

@@ -245,7 +245,8 @@ public:
 
     /**
      * Advance the simulation by a number of steps. @throws OpenMMException naming the first
-     * non-finite position or force
+     * non-finite position or force, or a particle that a step which is too long for its force would
+     * carry away; that step is not made
      */
     void step(int steps) override;
     /**

@@ -42,6 +42,8 @@ public:
      * a change of the box alone is not told.
      */
     virtual void positionsChanged() {}
+    /** The same, by the Context: a run ends here, and the next step begins another one. */
+    virtual void positionsSet() { positionsChanged(); }
     /** Throw, naming the first non-finite position, before any Force sees it. */
     virtual void checkPositions(OpenMM::ContextImpl& context) = 0;
     /** Have the forces of a step computed. @param groups  force groups, as bits */
