@@ -379,3 +379,21 @@ def testNothingLimitsTheStep():
         advice = accuracy.recommendStep(context)
         assert advice.rate is None and advice.stable is None and advice.bias is None
         assert advice.recommended == (expected and pytest.approx(expected))
+
+
+@pytest.mark.onePlatform
+def testRecommendedStepWithoutAFluid():
+    """A free-draining chain relaxes at stiffness times mobility times 2 - 2 cos(pi 7/8); spheres alone at no rate."""
+    def free(integrator):
+        integrator.setMobilityModel(PSEBrownianIntegrator.FreeDraining)
+
+    stiffness = 40*KT/RADIUS**2
+    chain = scenes.chain(8, 2*RADIUS, 20.0, RADIUS, 785)
+    springs = scenes.harmonicBonds([(i, i + 1) for i in range(7)], 0.0, stiffness)
+    context, _ = makeContext(chain, "CPU", TEMPERATURE, 1e-3*UNIT, forces=[springs], configure=free)
+    advice = accuracy.recommendStep(context, bias=0.01)
+    assert advice.rate == pytest.approx(stiffness*chain.mu0*(2 - 2*np.cos(np.pi*7/8)), rel=0.01)
+    assert advice.recommended == pytest.approx(0.02/(1.01*advice.rate))
+    context, _ = makeContext(chain, "CPU", TEMPERATURE, 1.0, configure=free)
+    advice = accuracy.recommendStep(context)
+    assert advice.recommended is None and "neither a fluid" in advice.reason

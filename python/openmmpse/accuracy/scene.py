@@ -126,16 +126,25 @@ class Scene:
             integrator.setTemperature(0)
         return Probe(self, integrator, {**self.properties, **(self._double if exact else {})})
 
+    @property
+    def hasFluid(self):
+        """Whether particles feel each other through the fluid."""
+        return self._template.getMobilityModel() != PSEBrownianIntegrator.FreeDraining
+
+    def requireFluid(self):
+        """The scene itself. Raises SceneError where there is no hydrodynamic error to measure."""
+        if not self.hasFluid:
+            raise SceneError(
+                "the integrator is set to FreeDraining, which has no hydrodynamic error; "
+                "call setMobilityModel(PSEBrownianIntegrator.RotnePragerYamakawa)"
+            )
+        return self
+
     def _check(self):
         if self.count == 0:
             raise SceneError(
                 f"none of the {len(self.mobile)} particles can move (all masses are 0); "
                 "give a mass above 0 to those that do: its value does not matter"
-            )
-        if self._template.getMobilityModel() == PSEBrownianIntegrator.FreeDraining:
-            raise SceneError(
-                "the integrator is set to FreeDraining, which has no hydrodynamic error; "
-                "call setMobilityModel(PSEBrownianIntegrator.RotnePragerYamakawa)"
             )
         if self.platform == "Reference" and self.count > MOST_FOR_REFERENCE:
             raise SceneError(

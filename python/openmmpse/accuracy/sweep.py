@@ -70,7 +70,7 @@ def measure(source, positions=None, integrator=None, *, box=None, platform=None,
     openmm.OpenMMException
         for what the library refuses
     """
-    scene = sceneOf(source, positions, integrator, box, platform, properties)
+    scene = sceneOf(source, positions, integrator, box, platform, properties).requireFluid()
     return Sweep(scene, runLength, tolerances, split, correlationTime, budget, rounds, progress, bias).run()
 
 

@@ -48,7 +48,7 @@ def recommendStep(source, positions=None, integrator=None, *, box=None, platform
     the scene first: an overlap that equilibrium does not have makes the steps shorter than need be.
 
     Where no forces limit it, or softer ones than the fluid, the step is that of an rms displacement of 0.3 radii, in
-    which the mobility changes.
+    which the mobility changes; without a fluid (FreeDraining) nothing limits it there.
 
     Example:
 
@@ -106,11 +106,12 @@ def _step(scene, rate, bias):
     if rate > 0:
         limits.append((2 * bias / ((1 + bias) * rate), f"a bias of {bias:g} in the stiffest mode"))
     diffusion = scene.thermalEnergy * scene.freeMobility
-    if diffusion > 0:
+    if diffusion > 0 and scene.hasFluid:
         limits.append(
             ((MOST_MOVED * scene.radius) ** 2 / (6 * diffusion), f"an rms displacement of {MOST_MOVED:g} radii")
         )
-    return min(limits, default=(None, "nothing: there are neither noise nor forces that vary"))
+    missing = "neither noise nor forces that vary" if scene.hasFluid else "neither a fluid nor forces that vary"
+    return min(limits, default=(None, f"nothing: there are {missing}"))
 
 
 def stiffestRate(probe, positions):

@@ -86,7 +86,7 @@ def tune(source, positions=None, integrator=None, *, box=None, platform=None, pr
     """
     checkNumbers(rounds=rounds)
     (tolerance,) = checkedTolerances([tolerance])
-    scene = sceneOf(source, positions, integrator, box, platform, properties)
+    scene = sceneOf(source, positions, integrator, box, platform, properties).requireFluid()
     automatic = scene.probe(tolerance, split)
     used = automatic.parameters
     forces = np.random.default_rng(11).normal(size=scene.positions.shape)
