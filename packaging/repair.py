@@ -94,8 +94,8 @@ def withLicence(metadata, expression, files):
     places = [i for i, line in enumerate(lines) if line.startswith("License-Expression:")]
     if len(places) != 1:
         raise RepairError(f"the metadata have {len(places)} lines License-Expression, not one")
-    lines[places[0]] = f"License-Expression: {expression}"
-    lines += [f"License-File: {name}" for name in files]
+    named = [f"License-File: {name}" for name in files]
+    lines[places[0] : places[0] + 1] = [f"License-Expression: {expression}", *named]
     return "\n".join(lines) + separator + body
 
 

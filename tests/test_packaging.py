@@ -156,7 +156,9 @@ def testMetadataOfAWheel(tmp_path):
     head, _, body = text.partition("\n\n")
     named = re.findall(r"^License-File: (.+)$", head, re.MULTILINE)
     assert f"\nLicense-Expression: {expression}\n" in text and expression == "MIT AND MPL-2.0 AND Apache-2.0"
-    assert body == "Long\n\ntext\n" and named[0] == "LICENSE" and {"Eigen.txt", "Highway.txt"} <= set(named)
-    assert all((information / "licenses" / name).stat().st_size > 100 for name in named[1:])
+    assert body == "Long\n\ntext\n" and {"LICENSE", "Eigen.txt", "Highway.txt"} <= set(named)
+    assert all((information / "licenses" / name).stat().st_size > 100 for name in named if name != "LICENSE")
+    assert repair.withLicence("Name: x\nLicense-Expression: MIT\n", "MIT AND MPL-2.0", ["a.txt"]) == (
+        "Name: x\nLicense-Expression: MIT AND MPL-2.0\nLicense-File: a.txt\n")  # without a long description
     with pytest.raises(repair.RepairError, match="0 lines"):
         repair.withLicence("Name: x\n\n", "MIT", [])
