@@ -26,7 +26,10 @@ import publicnames  # noqa: E402
 PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 FOLDERS = "benchmarks|cmake|docs|examples|numerics|openmmapi|packaging|platforms|python|serialization|tests"
 FILE = re.compile(rf"(?:{FOLDERS})/[\w/.-]+\.(?:cc|cff|cmake|cpp|csv|h|i|json|md|png|py|svg|toml|txt)\b")
-SHORT = {"quick-start": ("FRAMES, STEPS = 2000, 100", "FRAMES, STEPS = 200, 20")}  # 20 ns instead of 1000
+SHORT = {
+    "quick-start": ("FRAMES, STEPS = 2000, 100", "FRAMES, STEPS = 200, 20"),  # 20 ns instead of 1000
+    "reporter": ("COUNT, EDGE, STEPS = 300, 8.0, 3000", "COUNT, EDGE, STEPS = 60, 5.0, 60"),
+}
 SIGMAS = 4.9  # two-sided false-alarm rate 1e-6
 
 
@@ -68,6 +71,15 @@ def test_choosing(tmp_path, monkeypatch):
     assert advice.recommended == pytest.approx(advice.stable * 0.01 / 1.01, rel=1e-9)  # theory [T60]
     for name in ("system", "state", "integrator"):
         openmm.XmlSerializer.deserialize((tmp_path / f"{name}.xml").read_text())
+
+
+def test_reporter(tmp_path, monkeypatch):
+    names = runPage("reporter", tmp_path, monkeypatch)
+    header, *lines = (tmp_path / "fluid.csv").read_text().splitlines()
+    assert len(lines) == 3 and header == ",".join(names["reporter"].columns)
+    cells = re.findall(r"^\| (`[^|]*)", textOf("reporter"), re.MULTILINE)  # the first column of the table
+    documented = {name for cell in cells for name in re.findall(r"`([^`]+)`", cell)}
+    assert {"share: ..." if name.startswith("share: ") else name for name in names["reporter"].columns} == documented
 
 
 def test_viscositiesOfTheTable():
