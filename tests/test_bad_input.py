@@ -520,7 +520,7 @@ def testAFailedStepLeavesTheNoiseAlone(platformName):
 @pytest.mark.parametrize("call", [
     lambda i: i.step(1), lambda i: i.applyMobility(np.zeros((1, 3))),
     lambda i: i.sampleBrownianDisplacements(1), lambda i: i.getNumericalParameters(),
-    lambda i: i.describe()])
+    lambda i: i.describe(), lambda i: i.getStageTimes()])
 def testCallsBeforeAContextExists(call):
     assertMentions(messageOf(call, makeIntegrator()), "Context", "not bound")
 

@@ -326,6 +326,7 @@ def testNumericalParametersOfAContext(platformName):
         "randomSeed": int,
     }
     assert all(type(value) is types.get(key, float) for key, value in parameters.items())
+    assert bool(parameters["instructions"]) == (platformName == "CPU")
     assert parameters["split"] in ("Prolate", "Hasimoto") and parameters["randomSeed"] == 11
     assert (
         parameters["xi"] > 0
