@@ -28,7 +28,7 @@ myst_heading_anchors = 3
 nitpicky = True
 # Names of others (OpenMM, NumPy, plain words in the type of an argument) are not links; ours must be.
 nitpick_ignore_regex = [("py:.*", r"(?!openmmpse\b).*")]
-default_role = "code"  # what docstrings put between single backticks
+default_role = "py:obj"  # what docstrings put between single backticks: code, and a link where it is a name
 
 toc_object_entries_show_parents = "hide"
 autodoc_member_order = "bysource"

@@ -8,9 +8,9 @@ from docutils import nodes
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util import logging
 
-TAG = re.compile(r"\[(T\d+)\]")
+TAG = re.compile(r"\[([AT]\d+)\]")
 PAGE = re.compile(r"(?:docs/)?([\w-]+)\.md")
-MENTION = re.compile(r"(\[T\d+\]|\bdocs/[\w-]+\.md)")  # in running text, where a bare name of a file is no page
+MENTION = re.compile(r"(\[[AT]\d+\]|\bdocs/[\w-]+\.md)")  # in running text, where a bare name of a file is no page
 LOGGER = logging.getLogger(__name__)
 KEY = "theory tags"
 
@@ -57,7 +57,8 @@ class CrossLinks(SphinxPostTransform):
 
     def linkToTag(self, tag, text):
         if tag not in self.places:
-            LOGGER.warning("no section has [%s] in its heading", tag, location=text.parent, type="crosslinks")
+            if any(tag[0] == other[0] for other in self.places):
+                LOGGER.warning("no section has [%s] in its heading", tag, location=text.parent, type="crosslinks")
             return None
         document, anchor = self.places[tag]
         return self.link(f"{self.addressOf(document)}#{anchor}", nodes.Text(f"[{tag}]"))

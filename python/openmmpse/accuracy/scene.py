@@ -115,6 +115,7 @@ class Scene:
         """A `Probe` of this scene; numerical parameters are automatic but for those in a dict `parameters`.
 
         exact  in double precision, where the platform has a choice: to compare others with
+
         Raises openmm.OpenMMException for what the library refuses.
         """
         integrator = copy.copy(self._template)
