@@ -5,8 +5,11 @@ published numbers.
 """
 import itertools
 import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
+import matplotlib
 import numpy as np
 import openmm
 import pytest
@@ -21,7 +24,9 @@ from oracle import freeSpaceScalars
 from scenes import FALSE_ALARM, cube, elongated, makeContext, rhombicDodecahedron, tilted, truncatedOctahedron
 from scenes import ETA, Scene, mixture
 
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "analysis.md"
 SPHERE = (1.0, 1 / (6 * math.pi), 1.0)  # radius, viscosity, kT: D0 = 1
+matplotlib.use("Agg")
 MOST = stats.norm.isf(FALSE_ALARM / 2)
 
 
@@ -496,3 +501,18 @@ def testGreenKuboOfRouseChainsByTheLibrary(platformName):
     eta = 2 * dt * (np.cumsum(G) - (G + G[0]) / 2)
     assert abs(found.viscosity.values[-1] - eta[-1]) < limit * found.viscosity.errors[-1]
     assert found.viscosity.errors[-1] < 0.15 * eta[-1]
+
+
+# ---------------------------------------------------------------- the page
+
+def testThePageRuns(tmp_path, monkeypatch, capsys):
+    """The script of docs/analysis.md, a quarter as long: what it prints, and its picture."""
+    monkeypatch.chdir(tmp_path)
+    script = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
+    assert "STEPS, INTERVAL, STEP = 40_000," in script
+    found = {}
+    exec(compile(script.replace("40_000", "10_000"), str(PAGE), "exec"), found)
+    assert capsys.readouterr().out.startswith("trend Estimate(")
+    assert (tmp_path / "analysis.png").stat().st_size > 10_000
+    limit = stats.t.isf(FALSE_ALARM / 2, found["fit"].degrees)
+    assert found["fit"].coefficient.shifted(found["correction"]).deviation(found["kirkwood"].value) < limit

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diffusion of molecules made of beads in infinite solvent, by dense NumPy algebra on configurations; [A4], [A5].
+"""Diffusion of molecules made of beads in infinite solvent, by dense NumPy algebra on configurations; [A3].
 
 Nothing here shares a line with the integrator. Units are OpenMM's: nm, ps, kJ/mol, Da/(nm ps). Diffusion coefficients
 are in nm^2/ps (1 nm^2/ps = 1e-6 m^2/s). Beads may differ in radius.
@@ -66,7 +66,7 @@ def mobilityMatrix(positions, radii, viscosity):
 
 
 def kirkwood(positions, radii, viscosity, kT):
-    """Short-time diffusion coefficient of the mean position of the beads, nm^2/ps: kT tr(sum_ij M_ij)/(3 N^2) [A4].
+    """Short-time diffusion coefficient of the mean position of the beads, nm^2/ps: kT tr(sum_ij M_ij)/(3 N^2) [A3].
 
     positions  (N, 3), nm: a number is returned; (frames, N, 3): an array (frames,)
     radii      nm, one or (N,)
@@ -83,11 +83,11 @@ def kirkwood(positions, radii, viscosity, kT):
     safe = np.where(r > 0, r, 1.0)
     touching = (2 * safe * (large + small) - safe**2 - (large - small) ** 2) / (4 * safe * large * small)
     trace = np.select([r >= large + small, r > large - small], [1 / safe, touching], 1 / large)
-    return kT * stokesMobility(1.0, viscosity) * trace.mean()
+    return float(kT * stokesMobility(1.0, viscosity) * trace.mean())
 
 
 def gaussianChainKirkwood(count, bond, radius, viscosity, kT):
-    """Kirkwood's short-time diffusion coefficient averaged over ideal Gaussian chains, nm^2/ps [A4].
+    """Kirkwood's short-time diffusion coefficient averaged over ideal Gaussian chains, nm^2/ps [A3].
 
     count: beads; bond: root mean square bond length, nm. Each distance along the chain has a Maxwell
     distribution; the average of the traced Rotne-Prager-Yamakawa tensor over it is closed (error functions).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a periodic fluid does to diffusion, and diffusion at short times from the library's own mobility; [A5], [A6]."""
+"""What a periodic fluid does to diffusion, and diffusion at short times from the library's own mobility; [A3], [A4]."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def boxVectors(box):
 
 
 def latticeConstant(box):
-    """C of [A5]: kT C/(6 pi eta V^(1/3)) is what the images take from the diffusion coefficient of a small particle.
+    """C of [A4]: kT C/(6 pi eta V^(1/3)) is what the images take from the diffusion coefficient of a small particle.
 
     2.8372974794806 in a cube (Hasimoto 1959). A third of the trace of the periodic Stokeslet is a solution of Poisson's
     equation, so C is the lattice's Madelung constant in a neutral background, here by Ewald's sums to 1e-14.
@@ -45,7 +45,7 @@ def _latticeConstant(data):
 
 
 def finiteSizeCorrection(box, viscosity, kT, radius=0.0, gyration=0.0):
-    """What to add to a diffusion coefficient measured in a periodic fluid, averaged over directions, nm^2/ps [A5].
+    """What to add to a diffusion coefficient measured in a periodic fluid, averaged over directions, nm^2/ps [A4].
 
         D_inf - D_box = kT/(6 pi eta V^(1/3)) (C - (4 pi/3) (Rg^2 + a^2)/V^(2/3))
 
@@ -60,11 +60,11 @@ def finiteSizeCorrection(box, viscosity, kT, radius=0.0, gyration=0.0):
     vectors = boxVectors(box)
     edge = np.linalg.det(vectors) ** (1 / 3)
     second = 4 * math.pi / 3 * (gyration**2 + radius**2) / edge**2
-    return kT / (6 * math.pi * viscosity * edge) * (latticeConstant(vectors) - second)
+    return float(kT / (6 * math.pi * viscosity * edge) * (latticeConstant(vectors) - second))
 
 
 def shortTimeDiffusion(context, particles=None):
-    """Exact short-time diffusion coefficient of the mean position of particles, nm^2/ps, in the fluid they are in [A4].
+    """Exact short-time diffusion coefficient of the mean position of particles, nm^2/ps, in the fluid they are in [A3].
 
     A unit force spread evenly over them moves their mean by tr(sum_ij M_ij)/(3 N^2), averaged over three directions:
     Kirkwood's double sum with the mobility that the Context itself uses, at its positions, images, mixtures and all,
@@ -84,7 +84,7 @@ def shortTimeDiffusion(context, particles=None):
         forces[particles, axis] = 1.0 / len(particles)
         total += np.mean(np.asarray(integrator.applyMobility(forces))[particles, axis])
     kT = (unit.MOLAR_GAS_CONSTANT_R * integrator.getTemperature()).value_in_unit(unit.kilojoule_per_mole)
-    return kT * total / 3
+    return float(kT * total / 3)
 
 
 def _lattice(rows, reach):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mean square displacements and diffusion coefficients with error bars; docs/analysis.md [A1] to [A3].
+"""Mean square displacements and diffusion coefficients with error bars; docs/analysis.md [A1], [A2].
 
 Positions must be unwrapped (see `trajectory.unwrap`), lengths in nm, times in ps, diffusion coefficients in nm^2/ps.
 Windows of one lag overlap inside a block, never across blocks or runs, and all particles of a run are averaged before

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Linear viscosity of what is in the solvent, from the stress at rest (Green and Kubo); docs/analysis.md [A8]."""
+"""Linear viscosity of what is in the solvent, from the stress at rest (Green and Kubo); docs/analysis.md [A6]."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class GreenKubo(NamedTuple):
 
 
 def greenKubo(stresses, interval, box, kT, longest, blocks=None, isotropic=True):
-    """`GreenKubo` of the stress at rest: G(t) = V/kT <s_xy(t) s_xy(0)> and its integral, with error bars [A8].
+    """`GreenKubo` of the stress at rest: G(t) = V/kT <s_xy(t) s_xy(0)> and its integral, with error bars [A6].
 
     stresses   (samples, 3, 3), kJ/(mol nm^3), of integrator.computeStress() at even intervals without flow; or a list of
                them, one per independent run

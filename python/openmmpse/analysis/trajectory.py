@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Trajectories read with MDTraj or MDAnalysis, as arrays in nm and ps, and unwrapped; docs/analysis.md [A7]."""
+"""Trajectories read with MDTraj or MDAnalysis, as arrays in nm and ps, and unwrapped; docs/analysis.md [A5]."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def readTrajectory(source, unwrapped=True):
 
 
 def unwrap(positions, boxes):
-    """Positions (frames, N, 3) with jumps across faces of the box taken back, nm [A7].
+    """Positions (frames, N, 3) with jumps across faces of the box taken back, nm [A5].
 
     boxes  (3, 3) rows, or (frames, 3, 3)
 
