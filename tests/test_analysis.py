@@ -120,8 +120,11 @@ def testErrorBarsOfDiffusionAreRight(kind):
 def testTheFitIsTheBestThereIs():
     """Its spread is that of generalised least squares with the exact covariance, well below that of a plain line."""
     rng, lags, frames, noise = np.random.default_rng(5), np.arange(1, 11), 200, 2.0
-    D = np.array([analysis.diffusion([brownian(rng, frames, 8, noise=noise), brownian(rng, frames, 8, noise=noise)], 2.0,
-                                     count=10, blocks=1).coefficient.value for _ in range(300)])
+    D = []
+    for _ in range(300):
+        runs = [brownian(rng, frames, 8, noise=noise) for _ in range(2)]
+        D.append(analysis.diffusion(runs, 2.0, count=10, blocks=1).coefficient.value)
+    D = np.array(D)
     step = 2 * 0.7 * 2.0
     covariance = displacements.brownianCovariance(frames, lags, 2 * noise**2 / step) * step**2 / (3 * 16) / (2 * 2.0)**2
     design = np.column_stack([np.ones(10), lags])
@@ -220,7 +223,8 @@ def testKirkwoodIsTheTraceOfTheDenseMobility(radii):
 def testRigidBodyIsMinimalAtItsCentreAndTheSameFromAnyOrigin():
     positions = np.random.default_rng(4).normal(scale=2.0, size=(10, 3)) * [1, 1, 3]
     translation, rotation = analysis.rigidBody(positions, *SPHERE)
-    assert analysis.rigidBody(positions + [5.0, -7.0, 2.0], *SPHERE) == pytest.approx((translation, rotation), rel=1e-10)
+    moved = analysis.rigidBody(positions + [5.0, -7.0, 2.0], *SPHERE)
+    assert moved == pytest.approx((translation, rotation), rel=1e-10)
     assert analysis.frozenBound(positions, *SPHERE) < translation < analysis.kirkwood(positions, *SPHERE)
 
 
@@ -327,7 +331,8 @@ def testNearestImagesAreThoseOfAllImages():
     vectors = rng.uniform(-20, 20, (1, 400, 3))
     labels = np.array(list(itertools.product(range(-6, 7), repeat=3)))
     shortest = np.linalg.norm(vectors[0][:, None] + labels @ box, axis=-1).min(axis=1)
-    assert np.linalg.norm(trajectory.nearestImages(vectors, box[None])[0], axis=-1) == pytest.approx(shortest, rel=1e-12)
+    found = trajectory.nearestImages(vectors, box[None])[0]
+    assert np.linalg.norm(found, axis=-1) == pytest.approx(shortest, rel=1e-12)
 
 
 def testFramesTooFarApartAreRefused():
@@ -454,7 +459,7 @@ def testGreenKuboOfDumbbells():
 
 
 def testOneShearAndFive():
-    """All five shears at once give the xy modulus of an isotropic fluid, with a smaller error; a rotation changes nothing."""
+    """All five shears give the xy modulus of an isotropic fluid, with a smaller error; a rotation changes nothing."""
     rng, samples = np.random.default_rng(5), 4000
     stresses = dumbbellStresses(rng, samples, 5, 0.8, 0.1)[0]
     five, one = (analysis.greenKubo(stresses, 0.1, 1.0, 1.0, 1.0, isotropic=flag).modulus for flag in (True, False))

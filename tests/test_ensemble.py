@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Many runs at once: killed workers, failing runs, checkpoints, and the table they end in."""
 import functools
+import importlib.util
 import os
+import re
 import signal
+from pathlib import Path
 
 import numpy as np
 import openmm
@@ -11,6 +14,7 @@ import pytest
 from openmmpse import PSEBrownianIntegrator, analysis, ensemble
 from platformnames import contextOn
 
+ROOT = Path(__file__).resolve().parents[1]
 INTERVAL, STEPS, EVERY = 5, 100, 4  # a checkpoint each 20 steps
 
 
@@ -71,7 +75,7 @@ def testAKilledWorkerLosesNothing(tmp_path):
     pytest.importorskip("pandas")
     from distributed import Client, LocalCluster
     scenes = [{"kind": kind, "size": 1} for kind in ("quiet", "killed", "flaky", "hopeless")]
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
                       silence_logs=50) as cluster, Client(cluster) as client:
         table = ensemble.runEnsemble(wander, scenes, [7], tmp_path / "sweep", client, retries=1, progress=False)
     assert list(table["kind"]) == ["quiet", "killed", "flaky", "hopeless"] and set(table["seed"]) == {7}
@@ -176,3 +180,42 @@ def testNamesOfFolders():
     assert ensemble._name({"beads": 10, "box": 2.5}, 3).startswith("beads=10_box=2.5-")
     assert ensemble._name({"a": 1, "b": 2}, 1) == ensemble._name({"b": np.int64(2), "a": 1}, 1)
     assert ensemble._name("x" * 200, 1) != ensemble._name("x" * 201, 1)
+
+
+# ---------------------------------------------------------------- the page and the example
+
+def testThePageRuns(tmp_path):
+    """One run of the script in docs/ensembles.md, a tenth as long: a sphere in its box."""
+    page = ROOT / "docs" / "ensembles.md"
+    script = re.search(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)[1]
+    assert "20_000" in script
+    found = {"__name__": "page"}
+    exec(compile(script.replace("20_000", "2_000"), str(page), "exec"), found)
+    row = ensemble.perform(found["simulate"], {"radius": 1.0}, 1, tmp_path)
+    D = analysis.Estimate(row["D"], row["D_error"])
+    kT, viscosity = analysis.thermalEnergy(293.15), 1.002 * analysis.MPA_S
+    exact = kT * analysis.stokesMobility(1.0, viscosity) - analysis.finiteSizeCorrection(10.0, viscosity, kT, 1.0)
+    assert D.deviation(exact) < 12  # false alarm rate 1e-6 (Student's distribution, 10 blocks)
+    assert D.error < 0.2 * exact
+
+
+def testTheExample(tmp_path, monkeypatch):
+    """examples/parameter_sweep.py without its cluster: chains of five beads, with and without hydrodynamics."""
+    pandas = pytest.importorskip("pandas")
+    spec = importlib.util.spec_from_file_location("parameter_sweep", ROOT / "examples" / "parameter_sweep.py")
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    rows = []
+    for wet in (True, False):
+        for seed in range(1, 5):
+            scene = {"beads": 5, "hydrodynamics": wet, "length": 5}
+            rows.append(scene | ensemble.perform(example.simulate, scene, seed, tmp_path / f"{wet}{seed}"))
+    table = pandas.DataFrame(rows)
+    lines = example.draw(table, tmp_path / "picture.png")
+    assert len(lines) == 2 and "Rouse 0.2000" in lines[1] and (tmp_path / "picture.png").stat().st_size > 5000
+    alone = example.KT * analysis.stokesMobility(example.RADIUS, example.VISCOSITY)
+    # Errors of the blocks of four runs have 36 degrees of freedom: false alarm rate below 1e-6.
+    for wet, expected in ((True, table["Kirkwood"].mean() / alone), (False, 0.2)):
+        runs = table[table["hydrodynamics"] == wet]
+        error = np.sqrt(np.square(runs["D_error"]).sum()) / len(runs) / alone
+        assert abs(runs["D"].mean() / alone - expected) < 6 * error

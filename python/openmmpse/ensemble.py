@@ -30,6 +30,8 @@ import openmm
 
 from openmmpse.analysis.estimates import Estimate
 
+__all__ = ["Run", "perform", "runEnsemble"]
+
 CHECKPOINT, RESULT, ATTEMPTS, TABLE = "checkpoint.npz", "result.json", "attempts.txt", "table.csv"
 CHECKPOINTS = 20  #: in a series that `Run.follow` records, unless told otherwise
 OWN = ("seed", "attempts", "seconds", "error")  #: columns of the table that are not of scenes or results
@@ -39,9 +41,12 @@ INSTALL = "install what it needs with: pip install 'openmm-pse[ensemble]'"
 class Run:
     """One run: a scene, a seed, and a folder that survives whoever works on it.
 
-    scene, seed  what `simulate` is to be done with
-    folder       of this run alone: for files of one's own, too
-    attempt      1, and one more each time that the run is begun again
+    Parameters
+    ----------
+    scene, seed
+        what `simulate` is to be done with
+    folder : path
+        of this run alone: for files of one's own, too
     """
 
     def __init__(self, scene, seed, folder):
@@ -76,9 +81,9 @@ class Run:
         """Bring a Context to the last checkpoint and return the arrays saved with it; None if there is no checkpoint.
 
         OpenMM's checkpoints are bound to version, platform and device. Where those are the same, one is loaded and the
-        run goes on as if nothing had happened, to the bit. Elsewhere it goes on from the State that is kept beside: with
-        all digits and, for the PSEBrownianIntegrator with the same seed, the same noise, while random numbers of others,
-        as a barostat's, begin anew.
+        run goes on as if nothing had happened, to the bit. Elsewhere it goes on from the State that is kept beside:
+        with all digits and, for the PSEBrownianIntegrator with the same seed, the same noise, while random numbers of
+        others, as a barostat's, begin anew.
         """
         path = self.folder / CHECKPOINT
         if not path.exists():
@@ -93,16 +98,26 @@ class Run:
             return {name[len(prefix) :]: content[name] for name in content.files if name.startswith(prefix)}
 
     def follow(self, context, steps, interval, observe=None, name="records", every=None):
-        """Make steps and return observe(context) after each `interval` of them, an array (steps // interval, ...).
+        """Make steps and return what is observed between them, an array (steps // interval, ...).
 
-        Checkpoints are written on the way, with what was observed so far, every so many records (None: 20 times in
-        all) and at the end. In a run that is begun again the first call restores the last checkpoint, so what was made
-        of the Context before it (positions, a minimisation) does not count then. Several series may follow each other,
-        each of a name of its own; between them nothing may change the Context. Trajectory files of reporters do not
-        know of any of this: observe what is needed, or write to run.folder in `observe`.
+        Checkpoints are written on the way, with what was observed so far, and at the end. In a run that is begun again
+        the first call restores the last checkpoint, so what was made of the Context before it (positions, a
+        minimisation) does not count then. Several series may follow each other, each of a name of its own; between
+        them nothing may change the Context. Trajectory files of reporters do not know of any of this: observe what is
+        needed, or write to run.folder in `observe`.
 
-        context  a Context, or an app.Simulation, whose Context is used and whose reporters are not
-        observe  returns a number or an array of always the same shape; None: steps are made, nothing is recorded
+        Parameters
+        ----------
+        context : openmm.Context or app.Simulation
+            of a Simulation the Context is used, its reporters are not
+        steps, interval : int
+            in all, and between two records
+        observe : callable, optional
+            observe(context) returns a number or an array of always the same shape; by default nothing is recorded
+        name : str
+            of the series
+        every : int, optional
+            records from one checkpoint to the next; by default a twentieth of all
         """
         context = getattr(context, "context", context)
         if self._series is None:
@@ -119,24 +134,40 @@ class Run:
 
 
 def runEnsemble(simulate, scenes, seeds, folder, client=None, threads=1, retries=2, progress=True):
-    """Do simulate(run) for every scene with every seed, and return one table, a pandas DataFrame.
+    """Do simulate(run) for every scene with every seed, and return one table.
 
-    simulate  a function of a `Run`; returns a dict of results, or one. Numbers, texts, `Estimate`s (two columns) and
-              arrays (lists in the table) will do. Workers load it by its module, or get a copy if that is the script
-    scenes    plain values that describe what to simulate: numbers, texts, dicts or lists of them. Keys of dicts become
-              columns of the table
-    seeds     positive numbers, or how many of them, from 1; give run.seed to the integrator
-    folder    of all files; all workers must see it. What is finished in there is not done again, so the same call
-              goes on where it was interrupted, or adds scenes and seeds: take a new folder for another `simulate`
-    client    a dask.distributed.Client; None: a cluster of processes on this machine, one for every `threads` cores
-    threads   of OpenMM's CPU platform, per run: sums of forces are the same to the bit with one alone
-    retries   how often a run that raises an exception is tried again, from its last checkpoint; how many workers may be
-              lost under a run is Dask's setting distributed.scheduler.allowed-failures (three)
-    progress  show a bar
+    Scripts need if __name__ == "__main__" around the call, as with all processes in Python. An exception in a run
+    loses no other run: it is told in the table.
 
-    The table has the columns of scenes, seed, those of results, attempts, seconds of the last one, and error: the
-    text of the exception of a run that failed to the end, which loses no other run. It is also in folder/table.csv.
-    Scripts need `if __name__ == "__main__":` around the call, as with all processes in Python.
+    Parameters
+    ----------
+    simulate : callable
+        of a `Run`; returns a dict of results, or one. Numbers, texts, `openmmpse.analysis.Estimate` (two columns) and
+        arrays (lists in the table) will do. Workers load it by its module, or get a copy if that is the script
+    scenes : list
+        plain values that describe what to simulate: numbers, texts, dicts or lists of them. Keys of dicts become
+        columns of the table
+    seeds : int or list of int
+        positive numbers, or how many of them, from 1; give run.seed to the integrator
+    folder : path
+        of all files; all workers must see it. What is finished in there is not done again, so the same call goes on
+        where it was interrupted, or adds scenes and seeds: take a new folder for another `simulate`
+    client : distributed.Client, optional
+        by default that of a cluster of processes on this machine, one for every `threads` cores, which ends with the
+        call
+    threads : int
+        of OpenMM's CPU platform, per run: sums of forces are the same to the bit with one alone
+    retries : int
+        how often a run that raises an exception is tried again, from its last checkpoint; how many workers may be lost
+        under a run is Dask's setting distributed.scheduler.allowed-failures (three)
+    progress : bool
+        show a bar
+
+    Returns
+    -------
+    pandas.DataFrame
+        columns of scenes, seed, those of results, attempts, seconds of the last one, and error: the text of the
+        exception of a run that failed to the end, else empty. It is also in folder/table.csv
     """
     _need("distributed", "pandas")
     folder = Path(folder).resolve()
@@ -179,7 +210,7 @@ def _distribute(simulate, pending, rows, client, threads, retries, progress):
     own = None
     if client is None:
         workers = max(1, min(system.CPU_COUNT // threads, len(pending)))
-        own = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+        own = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
         client = Client(own)
     futures = {}
     try:
@@ -215,7 +246,8 @@ def _columns(result, scene):
         row |= {name: value.value, f"{name}_error": value.error} if estimate else {name: value}
     taken = sorted(set(row) & {*OWN, *(scene if isinstance(scene, Mapping) else ("scene",))})
     if taken:
-        raise ValueError(f"results may not be called {', '.join(taken)}: these are columns of the scene or of the table")
+        names = ", ".join(taken)
+        raise ValueError(f"results may not be called {names}: these are columns of the scene or of the table")
     return row
 
 
@@ -263,9 +295,9 @@ def _machine(context):
 def _forgetLists(context, checkpoint):
     """Have OpenMM's CPU platform make its list of neighbours anew.
 
-    It keeps a list while particles are near the places where it was made, whatever is loaded, and the order in it is that
-    in which forces are rounded. A period away, which changes no energy of a periodic System, it must make another one, and
-    back again, too.
+    It keeps a list while particles are near the places where it was made, whatever is loaded, and the order in it is
+    that in which forces are rounded. A period away, which changes no energy of a periodic System, it must make another
+    one, and back again, too.
     """
     if context.getPlatform().getName() != "CPU":
         return

@@ -38,8 +38,21 @@ def radiusOfGyration(positions):
 def mobilityMatrix(positions, radii, viscosity):
     """Rotne-Prager-Yamakawa mobility of spheres in infinite solvent, overlaps included.
 
-    positions: (N, 3), nm; radii: nm, one or (N,). Returns (3N, 3N), nm/ps per kJ/(mol nm), symmetric positive definite.
     Source: Rotne and Prager 1969; Yamakawa 1970; for unequal radii Zuk, Wajnryb, Mizerski, Szymczak 2014.
+
+    Parameters
+    ----------
+    positions : array (N, 3)
+        nm
+    radii : float or array (N,)
+        nm
+    viscosity : float
+        Da/(nm ps)
+
+    Returns
+    -------
+    array (3N, 3N)
+        nm/ps per kJ/(mol nm), symmetric positive definite
     """
     r, unit = _distances(positions)
     n = len(r)
@@ -66,14 +79,27 @@ def mobilityMatrix(positions, radii, viscosity):
 
 
 def kirkwood(positions, radii, viscosity, kT):
-    """Short-time diffusion coefficient of the mean position of the beads, nm^2/ps: kT tr(sum_ij M_ij)/(3 N^2) [A3].
-
-    positions  (N, 3), nm: a number is returned; (frames, N, 3): an array (frames,)
-    radii      nm, one or (N,)
+    """Short-time diffusion coefficient of the mean position of the beads: kT tr(sum_ij M_ij)/(3 N^2) [A3].
 
     Exact for the Rotne-Prager-Yamakawa mobility; only its trace enters, which over 3 is 1/(6 pi eta r) beyond contact,
     (2 r (a + b) - r^2 - (a - b)^2)/(4 r a b) over 6 pi eta where spheres of radii a and b overlap, 1/(6 pi eta a) where
     the smaller one is inside. Kirkwood's formula for the long-time coefficient, of which it is an upper bound.
+
+    Parameters
+    ----------
+    positions : array (N, 3) or (frames, N, 3)
+        nm, in infinite solvent: not wrapped
+    radii : float or array (N,)
+        nm
+    viscosity : float
+        Da/(nm ps)
+    kT : float
+        kJ/mol
+
+    Returns
+    -------
+    float, or array (frames,)
+        nm^2/ps
     """
     positions = np.asarray(positions, dtype=float)
     if positions.ndim == 3:
@@ -89,8 +115,17 @@ def kirkwood(positions, radii, viscosity, kT):
 def gaussianChainKirkwood(count, bond, radius, viscosity, kT):
     """Kirkwood's short-time diffusion coefficient averaged over ideal Gaussian chains, nm^2/ps [A3].
 
-    count: beads; bond: root mean square bond length, nm. Each distance along the chain has a Maxwell
-    distribution; the average of the traced Rotne-Prager-Yamakawa tensor over it is closed (error functions).
+    Each distance along the chain has a Maxwell distribution; the average of the traced Rotne-Prager-Yamakawa tensor
+    over it is closed (error functions).
+
+    Parameters
+    ----------
+    count : int
+        beads
+    bond, radius : float
+        root mean square length of a bond, and radius of a bead, nm
+    viscosity, kT : float
+        Da/(nm ps), kJ/mol
     """
     total = float(count)
     for separation in range(1, count):
@@ -107,9 +142,22 @@ def freeDraining(count, radius, viscosity, kT):
 def rigidBody(positions, radii, viscosity, kT):
     """Diffusion of the beads frozen into one rigid body.
 
-    Returns (translation in nm^2/ps, rotation in 1/ps), each a third of a trace. Translation is taken
-    at the centre of diffusion, whose coefficient every point of the body shares at long times (Brenner 1967;
-    Garcia de la Torre and Bloomfield 1981).
+    Translation is taken at the centre of diffusion, whose coefficient every point of the body shares at long times
+    (Brenner 1967; Garcia de la Torre and Bloomfield 1981).
+
+    Parameters
+    ----------
+    positions : array (N, 3)
+        nm, three or more not on a line
+    radii : float or array (N,)
+        nm
+    viscosity, kT : float
+        Da/(nm ps), kJ/mol
+
+    Returns
+    -------
+    (float, float)
+        translation in nm^2/ps and rotation in 1/ps, each a third of a trace
     """
     centred = positions - np.mean(positions, axis=0)
     motion = _rigidMotions(centred)
@@ -127,13 +175,14 @@ def rigidBody(positions, radii, viscosity, kT):
 
 
 def frozenBound(positions, radii, viscosity, kT):
-    """What one shape contributes to a lower bound of the long-time diffusion coefficient, nm^2/ps.
+    """What one shape contributes to a lower bound of the long-time diffusion coefficient, nm^2/ps:
 
         <kT tr(R^-1)/3> <= D(long) <= Kirkwood,     R = sum_ij (M^-1)_ij
 
     D(long) is the least value of kT <(e + grad phi) M (e + grad phi)> over functions phi of the shape, with e the
     average over beads; Kirkwood's formula is phi = 0 (Wilemski and Tanaka 1981). The bound takes the least value shape
-    by shape: the beads then move with one velocity, as if frozen together. <> averages over shapes.
+    by shape: the beads then move with one velocity, as if frozen together. <> averages over shapes. Parameters as in
+    `rigidBody`.
     """
     motion = _rigidMotions(positions)[:, :3]
     resistance = motion.T @ np.linalg.solve(mobilityMatrix(positions, radii, viscosity), motion)

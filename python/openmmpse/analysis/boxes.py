@@ -27,7 +27,12 @@ def latticeConstant(box):
     """C of [A4]: kT C/(6 pi eta V^(1/3)) is what the images take from the diffusion coefficient of a small particle.
 
     2.8372974794806 in a cube (Hasimoto 1959). A third of the trace of the periodic Stokeslet is a solution of Poisson's
-    equation, so C is the lattice's Madelung constant in a neutral background, here by Ewald's sums to 1e-14.
+    equation, so C is the lattice's Madelung constant in a neutral background, here by Ewald's sums to 1e-13.
+
+    Parameters
+    ----------
+    box : float, array (3,) or (3, 3)
+        an edge, three edges or three vectors (rows), nm; Quantities, too
     """
     return _latticeConstant(boxVectors(box).tobytes())
 
@@ -45,17 +50,26 @@ def _latticeConstant(data):
 
 
 def finiteSizeCorrection(box, viscosity, kT, radius=0.0, gyration=0.0):
-    """What to add to a diffusion coefficient measured in a periodic fluid, averaged over directions, nm^2/ps [A4].
+    """What to add to a diffusion coefficient measured in a periodic fluid, averaged over directions, nm^2/ps [A4]:
 
         D_inf - D_box = kT/(6 pi eta V^(1/3)) (C - (4 pi/3) (Rg^2 + a^2)/V^(2/3))
 
     The first term is the flow that the images of a point force cause at its place (Yeh and Hummer 2004); the second is
     the uniform background that keeps the mean flow zero, averaged over the N^2 pairs of beads and over all
-    orientations (mean square distance 2 Rg^2). For diffusion at short times that is exact in every box, for beads nearer
-    to each other than to images; one orientation differs from the mean by (Rg/L)^4 of the first term in a cube. At long
-    times it is the usual approximation. In a suspension the viscosity is that of the suspension, and radius 0.
+    orientations (mean square distance 2 Rg^2). For diffusion at short times that is exact in every box, for beads
+    nearer to each other than to images; one orientation differs from the mean by (Rg/L)^4 of the first term in a cube.
+    At long times it is the usual approximation.
 
-    box: see `boxVectors`; radius of a bead and radius of gyration of the molecule in nm.
+    Parameters
+    ----------
+    box : float, array (3,) or (3, 3)
+        an edge, three edges or three vectors (rows), nm
+    viscosity : float
+        Da/(nm ps); in a suspension that of the suspension, with a radius of 0
+    kT : float
+        kJ/mol
+    radius, gyration : float
+        of a bead, and radius of gyration of the molecule, nm
     """
     vectors = boxVectors(box)
     edge = np.linalg.det(vectors) ** (1 / 3)
@@ -68,7 +82,14 @@ def shortTimeDiffusion(context, particles=None):
 
     A unit force spread evenly over them moves their mean by tr(sum_ij M_ij)/(3 N^2), averaged over three directions:
     Kirkwood's double sum with the mobility that the Context itself uses, at its positions, images, mixtures and all,
-    to its tolerance. context: of a PSEBrownianIntegrator; particles: indices, None: all that have a mass.
+    to its tolerance.
+
+    Parameters
+    ----------
+    context : openmm.Context
+        with a PSEBrownianIntegrator
+    particles : list of int, optional
+        by default all that have a mass
     """
     from openmmpse import PSEBrownianIntegrator
 

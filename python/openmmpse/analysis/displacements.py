@@ -26,16 +26,26 @@ class Diffusion(NamedTuple):
 
     coefficient: Estimate  #: nm^2/ps
     offset: Estimate  #: of the straight line at time zero, nm^2
-    trend: Estimate  #: late less early slope over 2 dimensions, nm^2/ps; zero within its error where motion is diffusive
+    trend: Estimate  #: late less early slope over 2 d, nm^2/ps; zero within its error where motion is diffusive
     curve: Curve  #: mean square displacement at the lags of the fit, nm^2
     degrees: int  #: of freedom of the error bars
 
 
 def centresOf(positions, molecules, masses=None):
-    """Centres of molecules, (frames, molecules, 3): of mass, or without masses of their beads.
+    """Centres of molecules: of mass, or without masses the means of their beads.
 
-    positions  (frames, N, 3), unwrapped; molecules: lists of indices, or their number if all are alike and in order
-    masses     (N,), any unit
+    Parameters
+    ----------
+    positions : array (frames, N, 3)
+        unwrapped
+    molecules : list of lists of int, or int
+        indices of the particles of each, or the number of molecules if all are alike and one after the other
+    masses : array (N,), optional
+        in any unit
+
+    Returns
+    -------
+    array (frames, molecules, 3)
     """
     positions = np.asarray(positions, dtype=float)
     if isinstance(molecules, (int, np.integer)):
@@ -76,13 +86,23 @@ def meanSquares(path, lags):
 
 
 def meanSquareDisplacement(runs, interval, lags=None, blocks=None):
-    """`Curve` of the mean square displacement over all dimensions, nm^2, with error bars.
+    """Mean square displacement over all dimensions, with error bars [A1].
 
-    runs      positions (frames, N, d) or (frames, d), unwrapped, in equilibrium; or a list of them, one per
-              independent run
-    interval  time between frames, ps
-    lags      in frames; None: about eight per factor of ten up to a quarter of a block
-    blocks    per run, None: ten in all; each must be long against the relaxation of what is measured
+    Parameters
+    ----------
+    runs : array (frames, N, d) or (frames, d), or a list of them
+        positions in nm, unwrapped, in equilibrium; a list has one for each independent run
+    interval : float
+        time between frames, ps
+    lags : list of int, optional
+        in frames; by default about eight per factor of ten up to a quarter of a block
+    blocks : int, optional
+        per run; by default ten in all. Each must be long against the relaxation of what is measured
+
+    Returns
+    -------
+    Curve
+        times in ps, values and errors in nm^2
     """
     runs = runsOf(runs)
     if lags is None:
@@ -94,16 +114,28 @@ def meanSquareDisplacement(runs, interval, lags=None, blocks=None):
 
 
 def diffusion(runs, interval, start=None, count=5, blocks=None, offset=True):
-    """`Diffusion`: a straight line through mean square displacements by generalised least squares [A2].
+    """Diffusion coefficient: a straight line through mean square displacements by generalised least squares [A2].
 
-    The lags are 1 .. count times `start`, ps, the time beyond which motion is diffusive (None: one frame). Displacements
-    of different lags are made of the same steps; the weights are those of Brownian motion plus a bounded random
-    displacement, which is what a molecule's inner motion adds: the line's offset. The weights make the error bar small,
-    the spread of blocks makes it right, whatever the motion is. Look at `trend`: if it is not zero within its error,
-    `start` is too early.
+    The lags are 1 .. count times `start`. Displacements of different lags are made of the same steps; the weights are
+    those of Brownian motion plus a bounded random displacement, which is what a molecule's inner motion adds: the
+    line's offset. The weights make the error bar small, the spread of blocks makes it right, whatever the motion is.
+    Look at `trend`: if it is not zero within its error, `start` is too early.
 
-    runs, interval, blocks: as for `meanSquareDisplacement`
-    offset   False: the line goes through the origin, as for a sphere alone; its error bar is the smallest then
+    Parameters
+    ----------
+    runs, interval, blocks
+        as in `meanSquareDisplacement`
+    start : float, optional
+        time in ps beyond which motion is diffusive; by default one frame
+    count : int
+        number of lags, 3 or more (without offset 1)
+    offset : bool
+        False: the line goes through the origin, as for a sphere alone; its error bar is the smallest then
+
+    Returns
+    -------
+    Diffusion
+        in nm^2 and ps
     """
     runs, interval = runsOf(runs), float(interval)
     first = 1 if start is None else int(round(float(start) / interval))

@@ -77,10 +77,26 @@ def runsOf(source):
 
 
 def blocksOf(runs, blocks=None, longest=0):
-    """Cut each run into equal blocks (the odd rest at its start is left out).
+    """Cut each run into equal blocks; the odd rest at its start is left out.
 
-    blocks   per run; None: as few as make FEWEST_BLOCKS in all runs together
-    longest  samples that must fit in a block beside another
+    Parameters
+    ----------
+    runs : list of array (samples, ...)
+        independent runs
+    blocks : int, optional
+        per run; by default as few as make ten in all runs together
+    longest : int
+        samples of a lag, which must fit in a block
+
+    Returns
+    -------
+    list of array
+        the blocks of all runs
+
+    Raises
+    ------
+    ValueError
+        if a lag does not fit
     """
     count = blocks or math.ceil(FEWEST_BLOCKS / len(runs))
     pieces = []

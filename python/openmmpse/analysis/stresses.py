@@ -23,19 +23,36 @@ class GreenKubo(NamedTuple):
 
 
 def greenKubo(stresses, interval, box, kT, longest, blocks=None, isotropic=True):
-    """`GreenKubo` of the stress at rest: G(t) = V/kT <s_xy(t) s_xy(0)> and its integral, with error bars [A6].
+    """Relaxation modulus and viscosity from the stress at rest, with error bars [A6]:
 
-    stresses   (samples, 3, 3), kJ/(mol nm^3), of integrator.computeStress() at even intervals without flow; or a list of
-               them, one per independent run
-    interval   ps; short against the fastest relaxation that counts
-    box        whose volume the stress is of: an edge, three edges or vectors
-    longest    time up to which both are wanted, ps. The error of the integral grows with it, so take its value where G
-               has vanished within its error, and not later
-    blocks     per run; None: ten in all. Each is to be many times `longest`
-    isotropic  True: the mean over all five independent shears, which have the same modulus in an isotropic fluid;
-               False: xy alone
+        G(t) = V/kT <s_xy(t) s_xy(0)>,     viscosity = its integral
 
     In equilibrium the mean of a shear stress is zero and is not subtracted. The solvent's own viscosity is not in it.
+
+    Parameters
+    ----------
+    stresses : array (samples, 3, 3), list of Quantities, or list of arrays
+        kJ/(mol nm^3), of integrator.computeStress() at even intervals without flow; a list of arrays has one for each
+        independent run
+    interval : float
+        between samples, ps; short against the fastest relaxation that counts
+    box : float, array (3,) or (3, 3)
+        an edge, three edges or three vectors (rows), nm, whose volume the stress is of
+    kT : float
+        kJ/mol
+    longest : float
+        time up to which both are wanted, ps. The error of the integral grows with it: take its value where G has
+        vanished within its error, and not later
+    blocks : int, optional
+        per run; by default ten in all. Each is to be many times `longest`
+    isotropic : bool
+        True: the mean over all five independent shears, which have the same modulus in an isotropic fluid; False: xy
+        alone
+
+    Returns
+    -------
+    GreenKubo
+        times in ps
     """
     runs = [_shears(run, isotropic) for run in runsOf(_plain(stresses))]
     interval, volume = float(interval), float(np.linalg.det(boxVectors(box)))

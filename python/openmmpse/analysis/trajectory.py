@@ -33,14 +33,23 @@ class Trajectory(NamedTuple):
 
 
 def readTrajectory(source, unwrapped=True):
-    """`Trajectory` of what other libraries read, in nm and ps.
-
-    source     mdtraj.Trajectory; MDAnalysis Universe or AtomGroup (all frames are read); or an array (frames, N, 3) in nm
-    unwrapped  take jumps across faces of the box back, where there is a box (`unwrap`)
+    """Frames that other libraries read, in nm and ps.
 
     Libraries are not imported here; what counts is the attributes. Files of OpenMM's DCDReporter and XTCReporter:
     write them with enforcePeriodicBox=False, and nothing has to be unwrapped. MDTraj gives frames of DCD files their
     numbers for times: give `diffusion` the interval yourself there.
+
+    Parameters
+    ----------
+    source : mdtraj.Trajectory, MDAnalysis Universe or AtomGroup, or array (frames, N, 3)
+        an array is in nm, without times and boxes
+    unwrapped : bool
+        take jumps across faces of the box back, where there is a box (`unwrap`)
+
+    Returns
+    -------
+    Trajectory
+        positions, times and boxes
     """
     if hasattr(source, "xyz") and hasattr(source, "unitcell_vectors"):
         boxes = source.unitcell_vectors
@@ -59,15 +68,30 @@ def readTrajectory(source, unwrapped=True):
 
 
 def unwrap(positions, boxes):
-    """Positions (frames, N, 3) with jumps across faces of the box taken back, nm [A5].
-
-    boxes  (3, 3) rows, or (frames, 3, 3)
+    """Take jumps across faces of the box back [A5].
 
     Each step is replaced by its shortest image in the box of its frame, tilted boxes included, and steps are added up.
-    That is exact as long as no particle moves by half the shortest lattice vector between frames; where a step comes
-    near to that, at two fifths, frames are too far apart to tell and it is refused. In a box that changes, this way of
-    adding up keeps diffusion right, where adding lattice vectors to positions does not. For shear flow let OpenMM write
-    unwrapped positions instead (enforcePeriodicBox=False): there images move relative to each other.
+    That is exact as long as no particle moves by half the shortest lattice vector between frames. In a box that
+    changes, this way of adding up keeps diffusion right, where adding lattice vectors to positions does not. For shear
+    flow let OpenMM write unwrapped positions instead (enforcePeriodicBox=False): there images move relative to each
+    other.
+
+    Parameters
+    ----------
+    positions : array (frames, N, 3)
+        nm, each in whatever image
+    boxes : array (3, 3) or (frames, 3, 3)
+        rows are the vectors in OpenMM's reduced form, nm
+
+    Returns
+    -------
+    array (frames, N, 3)
+        nm; the first frame as it was
+
+    Raises
+    ------
+    ValueError
+        if a step comes to two fifths of the shortest lattice vector: frames are too far apart to tell images
     """
     positions = np.asarray(positions, dtype=float)
     boxes = np.broadcast_to(np.asarray(boxes, dtype=float), (len(positions), 3, 3))
@@ -82,9 +106,10 @@ def unwrap(positions, boxes):
         if far.max() > 0:
             frame, particle = np.unravel_index(np.argmax(far), far.shape)
             raise ValueError(
-                f"particle {particle} moves by {np.linalg.norm(steps[frame, particle]):.3g} nm or an image of that before "
-                f"frame {begin + frame}, more than {limit[frame]:.3g} nm, two fifths of the shortest box vector: which "
-                "image it is cannot be told; write frames more often, or with enforcePeriodicBox=False and do not unwrap"
+                f"particle {particle} moves by {np.linalg.norm(steps[frame, particle]):.3g} nm or an image of that "
+                f"before frame {begin + frame}, more than {limit[frame]:.3g} nm, two fifths of the shortest box vector: which "
+                "image it is cannot be told; write frames more often, or with enforcePeriodicBox=False, and do not "
+                "unwrap"
             )
         out[begin:end] = out[begin - 1] + np.cumsum(steps, axis=0)
     return out
