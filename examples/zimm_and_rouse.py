@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""
+Zimm against Rouse: how diffusion and relaxation of a chain in a theta solvent depend on its length.
+
+Ideal chains of 10 to 300 beads in an unbounded fluid, with and without hydrodynamic interactions. Beads that drag each
+other along let the chain diffuse as D ~ N^-1/2 (Zimm) instead of N^-1 (Rouse), and its slowest mode relax in
+N^3/2 instead of N^2: nu = 1/2 in D ~ N^-nu, tau ~ N^(3 nu) and N^(1 + 2 nu).
+
+Expected, at each N and without any free parameter: D by Kirkwood's sum, averaged over Gaussian chains in closed form;
+1/tau by the mean rate at which the mode begins to decay, stiffness times <v M v>, with the same averages. Memory makes
+a mode in a fluid slower by a few percent; Rouse chains have none. Exponents reach 1/2 and 3/2 slowly.
+"""
+import math
+
+import numpy as np
+import openmm
+from common import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plt, ratioOf
+from common import chain, fluid, forcesOf, main, positionsOf, save
+from tqdm import tqdm
+
+from openmmpse.demo import polymer, theory
+
+RADIUS, BOND = 0.5, 1.0  #: nm; root mean square length of a bond
+SPRING = 3 * KT / BOND**2
+RECORDS, LAG = 40, 8  #: records per relaxation time, and how many of them the decay is taken over
+CHAINS = 64  #: independent chains behind a diffusion coefficient
+MEMORY = 0.05  #: by which a mode in a fluid may be slower than it begins
+
+
+def expected(count, hydrodynamics):
+    """Diffusion coefficient (nm^2/ps), relaxation time (ps) and vector (N,) of the mode."""
+    mode = np.cos(math.pi * (np.arange(count) + 0.5) / count) * math.sqrt(2 / count)
+    stiffness = 4 * SPRING * math.sin(math.pi / (2 * count))**2
+    if not hydrodynamics:
+        return KT * mobility(RADIUS) / count, 1 / (mobility(RADIUS) * stiffness), mode
+    # sums over all pairs of ever longer chains: second differences are the mean mobility of a pair
+    sums = [n**2 * theory.gaussian_chain_kirkwood(n, BOND, RADIUS, VISCOSITY, KT) / KT for n in range(1, count + 1)]
+    row = np.diff([0, 0, *sums], n=2) / 2
+    row[0] *= 2  # a bead and itself are one pair, not two
+    matrix = row[abs(np.subtract.outer(np.arange(count), np.arange(count)))]
+    return KT * matrix.mean(), 1 / (stiffness * mode @ matrix @ mode), mode
+
+
+def diffusion(integrator, context, chains, step):
+    """Diffusion coefficient (nm^2/ps) by thermal displacements of the centres of equilibrium chains."""
+    values = []
+    for chain_ in chains:
+        context.setPositions(chain_)
+        centres = np.mean(integrator.sampleBrownianDisplacements(50), axis=1)
+        values.append((centres**2).sum(axis=1).mean() / (6 * step))
+    return meanOf(values)
+
+
+def follow(count, replicas, hydrodynamics, options, bar):
+    """(value, error, degrees of freedom) of the diffusion coefficient (nm^2/ps) and of the relaxation time (ps)."""
+    _, tau, mode = expected(count, hydrodynamics)
+    step = min((0.03 if hydrodynamics else 0.1) / (SPRING * mobility(RADIUS)), tau / RECORDS / 4)
+    interval = round(tau / RECORDS / step)
+    context, integrator = fluid(chain(count, openmm.HarmonicBondForce(), (0.0, SPRING)), RADIUS, step, options,
+                                hydrodynamics, seed=count, threads=2 if count >= 100 else 1)
+    generator = np.random.default_rng([options.seed, count])
+    found = diffusion(integrator, context, [polymer.equilibrium(generator, count, BOND) for _ in range(CHAINS)], step)
+    lost, begun = [], []
+    for _ in range(replicas):
+        context.setPositions(polymer.equilibrium(generator, count, BOND))
+        x, v = [], []
+        for _ in range(3 * LAG + 1):
+            x.append(mode @ positionsOf(context))
+            v.append(mode @ integrator.applyMobility(forcesOf(context)))
+            integrator.step(interval)
+            bar.update(interval * count)
+        # noise does not know what was before it, so the drift alone tells how a mode is forgotten over LAG records
+        x, v = np.array(x[:-LAG]), np.array(v)
+        path = sum(v[i:len(x) + i] + v[i + 1:len(x) + i + 1] for i in range(LAG)) * interval * step / 2
+        lost.append(-(x * path).sum())
+        begun.append((x * x).sum())
+    decay, error, degrees = ratioOf(lost, begun)
+    span = LAG * interval * step
+    time = -span / math.log1p(-decay)
+    return found, (time, time**2 / span * error / (1 - decay), degrees)
+
+
+def exponent(counts, values, errors, exact):
+    """Slope of log values over log counts by weights of their errors, its error, and that of the exact values."""
+    weights = (values / errors)**2
+    away = np.log(counts) - np.average(np.log(counts), weights=weights)
+    norm = (weights * away**2).sum()
+    return (weights * away) @ np.log(values) / norm, norm**-0.5, (weights * away) @ np.log(exact) / norm
+
+
+def run(options):
+    counts, replicas = ([10, 20, 30], [40] * 3) if options.short else ([10, 30, 100, 300], [256, 128, 32, 5])
+    d0, rows = KT * mobility(RADIUS), []
+    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.8))
+    with tqdm(desc="chains", unit=" bead steps", unit_scale=True, disable=None) as bar:
+        for name, wet, color in (("Zimm", True, WET), ("Rouse", False, DRY)):
+            found = np.array([follow(*pair, wet, options, bar) for pair in zip(counts, replicas)])
+            theories = np.array([expected(count, wet)[:2] for count in counts])
+            for column, (what, unit, slack) in enumerate((("D/D0", d0, 0), ("tau, ns", 1000, MEMORY * wet))):
+                (value, error, degrees), exact = found[:, column].T, theories[:, column]
+                for i, count in enumerate(counts):
+                    rows.append(Row(f"{name}, N = {count}: {what}", value[i] / unit, error[i] / unit, exact[i] / unit,
+                                    "Kirkwood" if wet and not column else "first decay" if wet else "Rouse",
+                                    slack * exact[i] / unit, int(degrees[i])))
+                slope, slopeError, exactSlope = exponent(counts, value, error, exact)
+                rows.append(Row(f"{name}: exponent of {what.split(',')[0]}", slope, slopeError, exactSlope, "the same",
+                                slack / math.log(3), int(degrees.min())))
+                axes[column].errorbar(counts, value / unit, error / unit, fmt="o", color=color,
+                                      label=f"{name}, exponent {slope:.2f}")
+                axes[column].plot(counts, exact / unit, color=color, lw=1)
+    for axis, title in zip(axes, ("diffusion coefficient over that of a bead", "relaxation time of the chain, ns")):
+        axis.set(xscale="log", yscale="log", xlabel="beads", title=title)
+        axis.legend()
+    save(figure, options, "zimm_and_rouse.png")
+    return rows
+
+
+if __name__ == "__main__":
+    main(run, __doc__)
