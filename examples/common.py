@@ -27,7 +27,7 @@ class Row(NamedTuple):
     quantity: str
     value: float
     error: float  #: one standard error
-    expected: float
+    expected: float  #: not a number where nothing is expected
     source: str
     slack: float = 0.0
     degrees: int = 10**6  #: of freedom behind `error`

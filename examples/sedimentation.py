@@ -8,8 +8,8 @@ without them every sphere would settle as if it were alone at any volume fractio
 
 Expected: U/U0 = (1 - phi)^3/(1 + 2 phi) + phi^2/5, which is the Rotne-Prager-Yamakawa mobility averaged over the
 Percus-Yevick fluid (Brady and Durlofsky 1988, Phys. Fluids 31, 717). A periodic box of N spheres settles slower by
-1.7601 (phi/N)^(1/3) S, S = (1 - phi)^4/(1 + 2 phi)^2 the structure factor at zero wave number; that is added. What
-is left of the size of the box, and the error of Percus and Yevick, is below 3 %.
+1.7601 (phi/N)^(1/3) S, S = (1 - phi)^4/(1 + 2 phi)^2 the structure factor at zero wave number; that is added.
+The distances that Percus and Yevick's theory gives to spheres are not exact: up to 4 % of U at phi = 0.4 may be left.
 """
 import numpy as np
 import openmm
@@ -19,7 +19,7 @@ from tqdm import tqdm
 from openmmpse import PSEBrownianIntegrator
 
 RADIUS = 1.0  #: nm
-DIFFERENCE = 0.03  #: of U/U0, between formula and simulation
+DIFFERENCE = 0.04  #: of U/U0, between formula and simulation
 
 
 def formula(phi):
