@@ -10,12 +10,11 @@ import numpy as np
 import openmm
 from openmm import unit
 
-from openmmpse import PSEBrownianIntegrator
-from openmmpse.demo import theory
+from openmmpse import PSEBrownianIntegrator, analysis
 
 TEMPERATURE = 293.15  #: K
-VISCOSITY = 1.002 * theory.MPA_S  #: water at 20 C, Da/(nm ps)
-KT = theory.thermal_energy(TEMPERATURE)  #: kJ/mol
+VISCOSITY = 1.002 * analysis.MPA_S  #: water at 20 C, Da/(nm ps)
+KT = analysis.thermalEnergy(TEMPERATURE)  #: kJ/mol
 WET, DRY, THEORY = "#0072B2", "#D55E00", "#222222"  #: with and without hydrodynamic interactions, and expected
 STYLE = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
          "figure.constrained_layout.use": True, "svg.fonttype": "none", "savefig.dpi": 100}
@@ -48,7 +47,7 @@ def ratioOf(above, below):
 
 def mobility(radius):
     """Of one sphere in water, nm/ps per kJ/(mol nm)."""
-    return theory.stokes_mobility(radius, VISCOSITY)
+    return analysis.stokesMobility(radius, VISCOSITY)
 
 
 def fluid(system, radius, step, options, hydrodynamics=True, seed=0, temperature=TEMPERATURE,

@@ -17,13 +17,14 @@ import numpy as np
 from common import DRY, KT, THEORY, VISCOSITY, WET, Row, main, mobility, plt, save
 from tqdm import tqdm
 
-from openmmpse.demo import network, simulate, statistics, structure, theory
+from openmmpse import analysis
+from openmmpse.demo import network, simulate, statistics, structure
 
 RADIUS = 0.484  #: nm
 MEASURED = 0.1  #: by which a folded protein may differ from the law of Wilkins et al.
 RIGID = 0.02  #: by which a protein that breathes may differ from a rigid one
 OPTIONS = [("structure", {"nargs": "?", "help": "a PDB file (default: T4 lysozyme)"})]
-SI = theory.M2_PER_S * 1e10  #: nm^2/ps in 1e-10 m^2/s
+SI = analysis.M2_PER_S * 1e10  #: nm^2/ps in 1e-10 m^2/s
 
 
 def follow(solvent, start, steps, interval, drift, bar):
@@ -48,8 +49,8 @@ def longTime(paths, drifts, step, lag, short, blocks):
     lags = sorted({1, lag // 8, lag // 4, lag // 2, lag})
     mean, error = statistics.displacement_diffusion(paths, step, lags, blocks, noise, short.value)
     times, apparent, total = statistics.drift_integral(drifts, step, lag, blocks)
-    displaced = statistics.Estimate(mean[-1], np.hypot(error[-1], statistics.CONTROL * short.error))
-    sharp = short.minus(statistics.Estimate(total[0][-1], total[1][-1]))
+    displaced = analysis.Estimate(mean[-1], np.hypot(error[-1], statistics.CONTROL * short.error))
+    sharp = short.minus(analysis.Estimate(total[0][-1], total[1][-1]))
     return displaced, sharp, (np.array(lags) * step, mean, error), (times, short.value - apparent[0])
 
 
@@ -69,9 +70,9 @@ def run(options):
             alone = simulate.Solvent(molecule, options.platform, seed + 100, hydrodynamics=False)
             dry.append(follow(alone, x0, steps, 10, False, bar))
     shapes = [shape for _, _, found in wet for shape in found]
-    short = statistics.estimate([value for _, value in shapes])
-    kirkwood = np.mean([theory.kirkwood(x, RADIUS, VISCOSITY, KT) for x, _ in shapes])
-    rigid = np.mean([theory.rigid_body(x, RADIUS, VISCOSITY, KT)[0] for x, _ in shapes[::5]])
+    short = analysis.estimate([value for _, value in shapes])
+    kirkwood = np.mean([analysis.kirkwood(x, RADIUS, VISCOSITY, KT) for x, _ in shapes])
+    rigid = np.mean([analysis.rigidBody(x, RADIUS, VISCOSITY, KT)[0] for x, _ in shapes[::5]])
     paths, drifts = [w[0] for w in wet], [w[1] for w in wet]
     displaced, sharp, points, curve = longTime(paths, drifts, linear.step, lag, short, blocks)
     free = statistics.displacement_diffusion([d[0] for d in dry], 10 * linear.step, [1], blocks)

@@ -26,8 +26,7 @@ from openmm import app, unit
 from protein_diffusion import MEASURED, RADIUS, RIGID, longTime
 from tqdm import tqdm
 
-from openmmpse import PSEBrownianIntegrator
-from openmmpse.demo import statistics, theory
+from openmmpse import PSEBrownianIntegrator, analysis
 
 TEMPERATURE = 0.5 / 0.00831446261815324  #: K; kT = 0.5 kJ/mol, the reduced temperature of the model
 STEP, BROWNIAN_STEP = 0.25, 0.04  #: ps; beads that drag each other along relax slower, so longer steps are stable
@@ -77,7 +76,8 @@ def run(options):
     positions = app.GromacsGroFile(coordinates).getPositions(asNumpy=True)
     count = len(positions)
     records, lag, blocks, late = (3000, 100, 20, 0.07) if options.short else (60000, 2000, 12, RIGID)
-    kT, scale = theory.thermal_energy(TEMPERATURE), theory.thermal_energy(TEMPERATURE) * mobility(1.0)
+    kT = analysis.thermalEnergy(TEMPERATURE)
+    scale = kT * mobility(1.0)
     friction = 1 / (mobility(RADIUS) * system.getParticleMass(0).value_in_unit(unit.dalton))
 
     # The line that changes:
@@ -89,15 +89,15 @@ def run(options):
         wet = record(system, positions, after, STEP, records, 1, options, bar)
     shapes = [x for x, _ in wet[2]]
     squares = (np.diff(dry[0], axis=0)**2).sum(axis=1) / (60 * BROWNIAN_STEP)
-    free = statistics.Estimate(*meanOf([part.mean() for part in np.array_split(squares, 16)])[:2])
+    free = analysis.Estimate(*meanOf([part.mean() for part in np.array_split(squares, 16)])[:2])
     first, error, degrees = meanOf([value for _, value in wet[2]])
-    kirkwood = np.mean([theory.kirkwood(x, RADIUS, VISCOSITY, kT) for x in shapes])
-    rigid = np.mean([theory.rigid_body(x, RADIUS, VISCOSITY, kT)[0] for x in shapes[::4]])
-    _, last, points, curve = longTime([wet[0]], [wet[1]], STEP, lag, statistics.Estimate(kirkwood, 0.0), blocks)
+    kirkwood = np.mean([analysis.kirkwood(x, RADIUS, VISCOSITY, kT) for x in shapes])
+    rigid = np.mean([analysis.rigidBody(x, RADIUS, VISCOSITY, kT)[0] for x in shapes[::4]])
+    _, last, points, curve = longTime([wet[0]], [wet[1]], STEP, lag, analysis.Estimate(kirkwood, 0.0), blocks)
     rows = [Row(name, scale / d.value, scale * d.error / d.value**2, radius, source, slack * radius, degrees)
             for name, d, radius, source, slack, degrees in (
         ("Rh, nm: BrownianIntegrator", free, count * RADIUS, "N times 0.484 nm", 0.0, 15),
-        ("PSEBrownianIntegrator, one step", statistics.Estimate(first, error), scale / kirkwood, "Kirkwood", 1e-3,
+        ("PSEBrownianIntegrator, one step", analysis.Estimate(first, error), scale / kirkwood, "Kirkwood", 1e-3,
          degrees),
         ("PSEBrownianIntegrator, long times", last, scale / rigid, "rigid bodies", late, blocks - 1),
         ("the same", last, 0.475 * count**0.29, "Wilkins et al.", MEASURED, blocks - 1))]

@@ -18,7 +18,8 @@ from common import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plt, ratioOf
 from common import chain, fluid, forcesOf, main, positionsOf, save
 from tqdm import tqdm
 
-from openmmpse.demo import polymer, theory
+from openmmpse import analysis
+from openmmpse.demo import polymer
 
 RADIUS, BOND = 0.5, 1.0  #: nm; root mean square length of a bond
 SPRING = 3 * KT / BOND**2
@@ -34,7 +35,7 @@ def expected(count, hydrodynamics):
     if not hydrodynamics:
         return KT * mobility(RADIUS) / count, 1 / (mobility(RADIUS) * stiffness), mode
     # sums over all pairs of ever longer chains: second differences are the mean mobility of a pair
-    sums = [n**2 * theory.gaussian_chain_kirkwood(n, BOND, RADIUS, VISCOSITY, KT) / KT for n in range(1, count + 1)]
+    sums = [n**2 * analysis.gaussianChainKirkwood(n, BOND, RADIUS, VISCOSITY, KT) / KT for n in range(1, count + 1)]
     row = np.diff([0, 0, *sums], n=2) / 2
     row[0] *= 2  # a bead and itself are one pair, not two
     matrix = row[abs(np.subtract.outer(np.arange(count), np.arange(count)))]
@@ -44,8 +45,8 @@ def expected(count, hydrodynamics):
 def diffusion(integrator, context, chains, step):
     """Diffusion coefficient (nm^2/ps) by thermal displacements of the centres of equilibrium chains."""
     values = []
-    for chain_ in chains:
-        context.setPositions(chain_)
+    for x in chains:
+        context.setPositions(x)
         centres = np.mean(integrator.sampleBrownianDisplacements(50), axis=1)
         values.append((centres**2).sum(axis=1).mean() / (6 * step))
     return meanOf(values)
@@ -75,8 +76,7 @@ def follow(count, replicas, hydrodynamics, options, bar):
         lost.append(-(x * path).sum())
         begun.append((x * x).sum())
     decay, error, degrees = ratioOf(lost, begun)
-    span = LAG * interval * step
-    time = -span / math.log1p(-decay)
+    time = -(span := LAG * interval * step) / math.log1p(-decay)
     return found, (time, time**2 / span * error / (1 - decay), degrees)
 
 
@@ -102,8 +102,8 @@ def run(options):
                     rows.append(Row(f"{name}, N = {count}: {what}", value[i] / unit, error[i] / unit, exact[i] / unit,
                                     "Kirkwood" if wet and not column else "first decay" if wet else "Rouse",
                                     slack * exact[i] / unit, int(degrees[i])))
-                slope, slopeError, exactSlope = exponent(counts, value, error, exact)
-                rows.append(Row(f"{name}: exponent of {what.split(',')[0]}", slope, slopeError, exactSlope, "the same",
+                slope, *others = exponent(counts, value, error, exact)
+                rows.append(Row(f"{name}: exponent of {what.split(',')[0]}", slope, *others, "the same",
                                 slack / math.log(3), int(degrees.min())))
                 axes[column].errorbar(counts, value / unit, error / unit, fmt="o", color=color,
                                       label=f"{name}, exponent {slope:.2f}")
