@@ -375,6 +375,19 @@ def makeContextForInstructions():
     return contextOn("CPU", system, integrator), integrator
 
 
+def testDoctorSurvivesDrivers(monkeypatch, capsys, tmp_path):
+    """One that ends the process, one that fails, and one that is right."""
+    from openmmpse import doctor
+
+    interpreter = tmp_path / "python"
+    monkeypatch.setattr(doctor.sys, "executable", str(interpreter))
+    for script, right in (("kill -ABRT $$", False), ("exit 1", False), ('[ "$5" = OpenCL ]', True)):
+        interpreter.write_text(f"#!/bin/sh\n{script}\n")
+        interpreter.chmod(0o755)
+        assert doctor.checkApart("OpenCL") == right
+        assert ("ended the process (status -6)" in capsys.readouterr().out) == ("ABRT" in script)
+
+
 def testDoctorNoticesWrongNumbers(monkeypatch, capsys):
     """A mobility a tenth of a per cent off, noise a per cent off, and a mobility of one particle off by 1e-7."""
     from openmmpse import doctor

@@ -11,6 +11,8 @@ import importlib.util
 import math
 import os
 import platform
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -268,10 +270,26 @@ def checkMany(name):
     )
 
 
+def checkApart(name):
+    """checkPlatform() in a process of its own: drivers of devices may end a process instead of telling an error."""
+    sys.stdout.flush()
+    status = subprocess.run([sys.executable, "-m", "openmmpse", "doctor", "--platform", name], check=False).returncode
+    if status not in (0, 1):
+        print(
+            f"{name:10} FAILED: its driver ended the process (status {status}); what it said may stand above. Renew "
+            "the driver; with PoCL, install the linker, too (Debian, Ubuntu: apt-get install binutils)"
+        )
+    return status == 0
+
+
 def main(argv=None):
     """Print the report; return 0 if every platform that this machine has works, else 1."""
     parser = argparse.ArgumentParser(prog="python -m openmmpse doctor", description=__doc__)
-    parser.parse_args(argv)
+    parser.add_argument("--platform", choices=plugins.LIBRARIES, help="check this platform alone")
+    options = parser.parse_args(argv)
+    if options.platform:
+        return 0 if checkPlatform(options.platform) else 1
     printInstallation()
-    results = [checkPlatform(name) for name in plugins.LIBRARIES]
+    apart = [name for name in plugins.DEVICES if name in plugins.platforms() and not whyNoDevice(name)]
+    results = [checkApart(name) if name in apart else checkPlatform(name) for name in plugins.LIBRARIES]
     return 0 if all(results) else 1
