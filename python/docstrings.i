@@ -118,8 +118,8 @@ PSE_GETTER_DOC(getShearRate, Quantity, Get the shear rate of the undisturbed flo
     rate (in 1/ps) of the flow (rate*y 0 0))
 PSE_SETTER_DOC(setShearRate, rate, Quantity or float,
     Set the shear rate of the undisturbed flow (rate*y 0 0). It takes effect at the next step; y is
-    the coordinate that the Context reports. The box tilts with the flow and flips back at half tilt.
-    On OpenCL and CUDA the default box of the System must be tilted: a small tilt will do.,
+the coordinate that the Context reports. The box tilts with the flow and flips back at half tilt.
+On OpenCL and CUDA the default box of the System must be tilted: a small tilt will do.,
     rate (in 1/ps), if it is not finite or the Context cannot be sheared)
 PSE_GETTER_DOC(getShearProtocol, int, Get how the shear rate depends on the time of the Context.,
     SteadyShear or OscillatoryShear or StartUpShear)
@@ -146,7 +146,7 @@ openmm.OpenMMException
 %}
 PSE_GETTER_DOC(getStrain, float,
     Get the strain of all sheared steps so far. Checkpoints and States with integrator parameters
-    hold it., integral of the shear rate over time (dimensionless))
+hold it., integral of the shear rate over time (dimensionless))
 PSE_GETTER_DOC(getErrorTolerance, float,
     Get the relative error allowed in M f and in the covariance of the noise.,
     tolerance (dimensionless))

@@ -5,6 +5,7 @@ name is left out."""
 import contextlib
 import inspect
 import io
+import os
 import sys
 
 import openmmpse
@@ -20,6 +21,7 @@ from openmmpse import __main__ as commandLine
 
 LOGGER = logging.getLogger(__name__)
 OPTIONAL = {"examples", "analysis", "reporter", "ensembles", "packaging"}
+os.environ["COLUMNS"] = "88"  # of the help of commands
 openmmpse.PSEBrownianIntegrator.__module__ = "openmmpse.binding"  # where autodoc finds the comments of constants
 
 
