@@ -53,10 +53,11 @@ void checkPlan(const Plan& plan, const PlanRequest& request) {
                 << " nm in this box; check the units of radius and box";
         throw std::invalid_argument(message.str());
     }
-    const double farthest = std::max(FARTHEST_IMAGES * request.box.smallestWidth(), 8 * plan.a);
-    if (request.overrides.xi > 0 && plan.sumImages && plan.realCutoff > farthest) {
+    const double farthest = std::max(FARTHEST_IMAGES * request.box.smallestWidth(), 8 * plan.a),
+                 range = plan.mixture ? plan.mixture->rangeOfPoints() * plan.a : plan.realCutoff;
+    if (request.overrides.xi > 0 && plan.sumImages && range > farthest) {
         message << "a splitting parameter of " << plan.xi << " /nm has a real-space range of "
-                << plan.realCutoff << " nm; sums over images farther than " << farthest
+                << range << " nm; sums over images farther than " << farthest
                 << " nm lose accuracy in this box; choose a larger splitting parameter, or 0 for "
                    "the automatic one";
         throw std::invalid_argument(message.str());

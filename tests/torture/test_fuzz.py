@@ -32,6 +32,14 @@ KEPT = {
         seed=50334, count=51, model="FreeDraining", phi=0.001324, tilts=(1.0, 1.0, -1.0), places="droplet",
         temperature=0.0, size=4.467e-05, repulsion=True, strain=0.241,
         calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
+    "a Plan of CPU for unequal spheres in a tilted box that moves": RandomScene(
+        seed=12254, split="Hasimoto", phi=2.085, edges=(3.589, 0.3911), tilts=(-0.63, 1.0, -1.0), places="chain",
+        kinds=0, ratio=8.385, radius=2.792, temperature=0.0, tolerance=0.002284, size=0.07786, repulsion=True,
+        wrapped=False, strain=-0.269, protocol="OscillatoryShear",
+        calls=(("box", 0.938, 0.34), ("stress",), ("parameter", 0.191))),
+    "a State saved in a box that the prescribed Plan does not fit": RandomScene(
+        count=37, phi=0.003671, edges=(1.344, 2.065), bonds=True, repulsion=True, strain=0.353,
+        calls=(("rate", 0.0), ("box", 1.035, 0.307), ("xml",), ("remake", 2.572e-06, 1.5))),
 }
 
 ONE_PLACE = dict(seed=5, count=20, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
@@ -82,7 +90,11 @@ def testRandomScenes(platformName, hardCase, request):
                          suppress_health_check=list(hypothesis.HealthCheck))
     @hypothesis.given(randomScenes)
     def hold(scene):
-        lockstep = Lockstep(scene, platformName)
+        try:
+            lockstep = Lockstep(scene, platformName)
+        except Refused as refusal:
+            refused.append(refusal)
+            return
         try:
             lockstep.run()
         except Refused as refusal:
