@@ -147,6 +147,34 @@ def testRestartInABreathingBox(platformName, way):
     assert np.array_equal(positionsOf(other), positionsOf(context))
 
 
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("way", ["checkpoint", "state"])
+def testABoxSetAroundARestart(platformName, way):
+    """
+    Whether a box moves or is another one counts from the last step, which a restart remembers: here the
+    second one is a small change of the first, which no step has seen, and none of that before.
+    """
+    s = suspension()
+    context, integrator = makeContext(s, platformName, T, DT, seed=12)
+    integrator.step(2)
+    context.setPeriodicBoxVectors(*(1.01*s.box))
+    if way == "checkpoint":
+        saved = context.createCheckpoint()
+    else:
+        saved = context.getState(positions=True, velocities=True, parameters=True, integratorParameters=True)
+        saved = openmm.XmlSerializer.deserialize(openmm.XmlSerializer.serialize(saved))
+    other, fresh = makeContext(s, platformName, T, DT, seed=12)
+    if way == "checkpoint":
+        other.loadCheckpoint(saved)
+    else:
+        other.setState(saved)
+    for one, steps in ((context, integrator), (other, fresh)):
+        one.setPeriodicBoxVectors(*(1.105*s.box))
+        steps.step(3)
+    assert planOf(fresh) == planOf(integrator)
+    assert np.array_equal(positionsOf(other), positionsOf(context))
+
+
 # ---------------------------------------------------------------- barostats
 
 @pytest.mark.hostOnly

@@ -42,6 +42,18 @@ void requireInRange(const char* name, double value, double low, double high) {
     refuse(message.str());
 }
 
+void writeBox(SerializationNode& node, const Vec3 box[3]) {
+    for (int d = 0; d < 3; d++)
+        for (int c = 0; c <= d; c++)
+            node.setDoubleProperty(BOX_ENTRIES[d][c], box[d][c]);
+}
+
+void readBox(const SerializationNode& node, Vec3 box[3]) {
+    for (int d = 0; d < 3; d++)
+        for (int c = 0; c <= d; c++)
+            box[d][c] = node.getDoubleProperty(BOX_ENTRIES[d][c]);
+}
+
 /** A counter of the noise from the text of a State. */
 unsigned long long counter(const string& text) {
     if (text.empty() || text.size() > 15 || text.find_first_not_of("0123456789") != string::npos)
@@ -371,11 +383,10 @@ void PSEBrownianIntegrator::serializeParameters(SerializationNode& node) const {
     if (state.plannedBox[0][0] == 0)
         return;
     SerializationNode& planned = node.createChildNode("PlannedBox");
-    for (int d = 0; d < 3; d++)
-        for (int c = 0; c <= d; c++)
-            planned.setDoubleProperty(BOX_ENTRIES[d][c], state.plannedBox[d][c]);
+    writeBox(planned, state.plannedBox);
     planned.setBoolProperty("moves", state.plannedToMove);
     planned.setDoubleProperty("shortest", state.plannedShortest);
+    writeBox(node.createChildNode("LastBox"), state.lastBox);
 }
 
 void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node) {
@@ -392,15 +403,13 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
     state.step = counter(node.getStringProperty("noiseStep"));
     state.sample = counter(node.getStringProperty("noiseSample"));
     state.strain = node.getDoubleProperty("strain", 0);
-    for (const SerializationNode& planned : node.getChildren()) {
-        if (planned.getName() != "PlannedBox")
-            continue;
-        for (int d = 0; d < 3; d++)
-            for (int c = 0; c <= d; c++)
-                state.plannedBox[d][c] = planned.getDoubleProperty(BOX_ENTRIES[d][c]);
-        state.plannedToMove = planned.getBoolProperty("moves");
-        state.plannedShortest = planned.getDoubleProperty("shortest");
-    }
+    for (const SerializationNode& child : node.getChildren())
+        if (child.getName() == "PlannedBox") {
+            readBox(child, state.plannedBox);
+            state.plannedToMove = child.getBoolProperty("moves");
+            state.plannedShortest = child.getDoubleProperty("shortest");
+        } else if (child.getName() == "LastBox")
+            readBox(child, state.lastBox);
     kernel.getAs<IntegratePSEStepKernel>().setStepState(state);
 }
 

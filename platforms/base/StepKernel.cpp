@@ -23,7 +23,7 @@ namespace PSE {
 
 namespace {
 
-constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 2";
+constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 3";
 /// Boxes from the origin: there a position is known to 1e-7 of the box.
 constexpr double FARTHEST = 1e9;
 /// Radii that rounding of a coordinate may be, in an unbounded fluid: 1e-7 at 1e9 radii from the
@@ -77,6 +77,11 @@ std::vector<OmmVec3> rowsOf(const Matrix3& matrix) {
     for (int d = 0; d < 3; d++)
         rows.emplace_back(matrix(d, 0), matrix(d, 1), matrix(d, 2));
     return rows;
+}
+
+/** @throws std::invalid_argument */
+Lattice latticeOf(const OmmVec3 box[3]) {
+    return Lattice(fromOpenMM(box[0]), fromOpenMM(box[1]), fromOpenMM(box[2]));
 }
 
 ShearFlow flowOf(const PSEBrownianIntegrator& integrator) {
@@ -163,6 +168,7 @@ void PlannedStepKernel::initialize(ContextImpl& context, const PSEBrownianIntegr
     scene = sceneSeen;
     settings = &integrator;
     engineBox.reset();
+    lastBox.reset();
     masses.clear();
     for (int i = 0; i < context.getSystem().getNumParticles(); i++)
         masses.push_back(context.getSystem().getParticleMass(i));
@@ -216,7 +222,7 @@ Lattice PlannedStepKernel::currentBox() const {
     OmmVec3 box[3];
     boxVectors(box);
     try {
-        return Lattice(fromOpenMM(box[0]), fromOpenMM(box[1]), fromOpenMM(box[2]));
+        return latticeOf(box);
     } catch (const std::invalid_argument& refusal) {
         throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
     }
@@ -277,8 +283,8 @@ Matrix3 PlannedStepKernel::interparticleStress(ContextImpl& context, int groups)
 
 std::optional<PlannedStepKernel::Prepared> PlannedStepKernel::prepareFor(const Lattice& box) const {
     const bool sheared = isSheared();
-    const bool breathes = !scene.barostat.empty() ||
-                          (engineBox && box != *engineBox && isSmallChange(*engineBox, box));
+    const bool breathes =
+        !scene.barostat.empty() || (lastBox && box != *lastBox && isSmallChange(*lastBox, box));
     const bool planned = request->moving || !(sheared || !scene.barostat.empty());
     const Lattice needed = sheared ? box.mostSheared() : box;
     if (planned && serves(*request, needed))
@@ -301,11 +307,24 @@ std::optional<PlannedStepKernel::Prepared> PlannedStepKernel::prepareFor(const L
     return prepared(next);
 }
 
+std::optional<PlannedStepKernel::Prepared> PlannedStepKernel::upcoming() const {
+    try {
+        return prepareFor(currentBox());
+    } catch (const OpenMMException&) {
+        return std::nullopt; // what has been computed so far can be saved all the same
+    }
+}
+
 void PlannedStepKernel::use(const Prepared& next, const Lattice& box) {
     useEngine(next.plan, box);
     currentPlan = next.plan;
     *request = next.request;
+    nowIn(box);
+}
+
+void PlannedStepKernel::nowIn(const Lattice& box) {
     engineBox = box;
+    lastBox = box;
 }
 
 void PlannedStepKernel::followBox() {
@@ -314,10 +333,9 @@ void PlannedStepKernel::followBox() {
     const Lattice box = currentBox();
     if (const std::optional<Prepared> next = prepareFor(box))
         use(*next, box);
-    else if (box != *engineBox) {
+    else if (box != *engineBox)
         setEngineBox(box);
-        engineBox = box;
-    }
+    nowIn(box);
 }
 
 double PlannedStepKernel::farthestPosition() const {
@@ -464,12 +482,12 @@ StepState PlannedStepKernel::getStepState() const {
     state.strain = strain;
     if (!request)
         return state;
-    // The box may have changed since the last step: what counts is what the next step will use.
-    const std::optional<Prepared> next = prepareFor(currentBox());
+    const std::optional<Prepared> next = upcoming();
     const PlanRequest& planned = next ? next->request : *request;
-    for (int d = 0; d < 3; d++)
-        for (int c = 0; c < 3; c++)
-            state.plannedBox[d][c] = planned.box.vectors()(c, d);
+    for (int d = 0; d < 3; d++) {
+        state.plannedBox[d] = toOpenMM(planned.box.vectors().col(d));
+        state.lastBox[d] = toOpenMM(lastBox->vectors().col(d));
+    }
     state.plannedToMove = planned.moving;
     state.plannedShortest = planned.shortest;
     return state;
@@ -491,10 +509,11 @@ PlanRequest PlannedStepKernel::requestOf(const StepState& state) const {
     planned.moving = state.plannedToMove;
     planned.shortest = state.plannedShortest;
     try {
-        planned.box = Lattice(fromOpenMM(state.plannedBox[0]), fromOpenMM(state.plannedBox[1]),
-                              fromOpenMM(state.plannedBox[2]));
+        planned.box = latticeOf(state.plannedBox);
+        if (state.lastBox[0][0] != 0)
+            latticeOf(state.lastBox);
     } catch (const std::invalid_argument&) {
-        throw damaged("a planned box that is none");
+        throw damaged("a planned or a last box that is none");
     }
     return planned;
 }
@@ -508,6 +527,8 @@ void PlannedStepKernel::setStepState(const StepState& state) {
                           planned.shortest == request->shortest;
         if (!same && serves(planned, needed))
             use(prepared(planned), box);
+        if (state.lastBox[0][0] != 0)
+            lastBox = latticeOf(state.lastBox);
     }
     steps = state.step;
     samples = state.sample;
@@ -519,8 +540,7 @@ void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
         return;
     const StepState state = getStepState();
     writeText(stream, CHECKPOINT_MAGIC);
-    // The box may have changed since the last step: what counts is the Plan that the next will use.
-    const std::optional<Prepared> next = request ? prepareFor(currentBox()) : std::nullopt;
+    const std::optional<Prepared> next = request ? upcoming() : std::nullopt;
     writeText(stream, signature(next ? next->plan : currentPlan));
     write(stream, seed);
     write(stream, state.step);
@@ -530,6 +550,8 @@ void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
         write(stream, edge);
     write(stream, state.plannedToMove);
     write(stream, state.plannedShortest);
+    for (const OmmVec3& edge : state.lastBox)
+        write(stream, edge);
 }
 
 void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
@@ -550,6 +572,8 @@ void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
         edge = read<OmmVec3>(stream);
     state.plannedToMove = read<bool>(stream);
     state.plannedShortest = read<double>(stream);
+    for (OmmVec3& edge : state.lastBox)
+        edge = read<OmmVec3>(stream);
     // Only what the checkpoint was planned for makes a Plan that may be compared with its own.
     const bool planned = request && state.plannedBox[0][0] != 0;
     const string ours = signature(planned ? prepared(requestOf(state)).plan : currentPlan);

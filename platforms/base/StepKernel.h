@@ -141,12 +141,18 @@ private:
     double longestStep() const;
     /** (1/V) dU/d(strain) [T47]. */
     numerics::Matrix3 interparticleStress(OpenMM::ContextImpl& context, int groups);
+    /**
+     * What the next step will use instead of the present Plan, since the box may have changed;
+     * nothing if that serves, or if none can be made: the step will tell.
+     */
+    std::optional<Prepared> upcoming() const;
     /** What must be planned for before a step in that box; nothing if the present Plan serves. */
     std::optional<Prepared> prepareFor(const numerics::Lattice& box) const;
     Prepared prepared(const numerics::PlanRequest& request) const;
     /** What the state was planned for. */
     numerics::PlanRequest requestOf(const StepState& state) const;
     void use(const Prepared& next, const numerics::Lattice& box);
+    void nowIn(const numerics::Lattice& box);
     void planUnbounded(const PSEBrownianIntegrator& integrator);
     NumericalParameters parametersOf(const numerics::Plan& plan) const;
     /** Everything that must agree for a checkpoint to continue exactly, in words. */
@@ -157,6 +163,8 @@ private:
     /// unbounded fluid
     std::unique_ptr<numerics::PlanRequest> request;
     std::optional<numerics::Lattice> engineBox;
+    /// that of the last step, also of one before a restart, which the engine has not seen
+    std::optional<numerics::Lattice> lastBox;
     numerics::Plan currentPlan = {};
     std::unique_ptr<numerics::UnboundedPlan> unboundedPlan; ///< NULL in any other scene
     int seed = 0;

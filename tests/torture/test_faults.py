@@ -127,8 +127,8 @@ def testABoxBelowTheLimit(platformName, hardCase):
     """
     The box shrunk to a twentieth of the radius in mid-run.
 
-    The step is refused with the limit; positions, time and count are those before; in the old box
-    the run goes on.
+    The step is refused with the limit; positions, time and count are those before, and can be saved; in
+    the old box the run goes on.
     """
     context, integrator = run(platformName)
     box = context.getState().getPeriodicBoxVectors()
@@ -137,6 +137,9 @@ def testABoxBelowTheLimit(platformName, hardCase):
     message = refusalOf(integrator.step, 1)
     assert "box" in message and "larger" in message
     assertUntouched(context, before)
+    context.createCheckpoint()
+    saved = context.getState(positions=True, integratorParameters=True)
+    assert np.array_equal(saved.getPositions(asNumpy=True)._value, before[0])
     context.setPeriodicBoxVectors(*box)
     integrator.step(2)
     assert np.all(np.isfinite(positionsOf(context)))

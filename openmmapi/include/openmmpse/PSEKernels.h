@@ -20,6 +20,8 @@ struct StepState {
     OpenMM::Vec3 plannedBox[3];
     bool plannedToMove = false;
     double plannedShortest = 1;
+    /// The box of the last step: whether the next one is a small change of it counts from there
+    OpenMM::Vec3 lastBox[3];
 };
 
 /** What a platform must be able to do for PSEBrownianIntegrator. */
