@@ -54,7 +54,7 @@ def simulate(run):
         x = context.getState(positions=True).getPositions(asNumpy=True)._value
         return [*x.mean(axis=0), analysis.kirkwood(x, RADIUS, VISCOSITY, KT)]
 
-    series = run.follow(build(count, hydrodynamics, run.seed), RECORDS * interval, interval, observe)
+    series = run.follow(build(count, hydrodynamics, run.noiseSeed), RECORDS * interval, interval, observe)
     time = interval * STEP
     fit = analysis.diffusion(series[:, :3], time, start=LAG * time, count=3, offset=hydrodynamics)
     return {"D": fit.coefficient, "Kirkwood": series[:, 3].mean()}
@@ -91,7 +91,7 @@ def main(argv=None):
     parser.add_argument("--short", action="store_true", help="seconds instead of minutes, with wider error bars")
     parser.add_argument("--output", type=Path, default=Path("example-output"), help="folder of all files")
     options = parser.parse_args(argv)
-    counts, length, seeds = ((5, 10), 5, 3) if options.short else ((5, 10, 20, 40), 20, 12)
+    counts, length, seeds = ((5, 10), 5, 3) if options.short else ((5, 10, 20, 40), 20, 8)
     scenes = [{"beads": n, "hydrodynamics": wet, "length": length} for n in counts for wet in (True, False)]
     table = ensemble.runEnsemble(simulate, scenes, seeds, options.output / "parameter_sweep")
     print("\n".join(draw(table, options.output / "parameter_sweep.png")))

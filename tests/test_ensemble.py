@@ -176,6 +176,14 @@ def testWhatIsMissingIsNamed(tmp_path, monkeypatch):
         ensemble.runEnsemble(forbidden, [1], 1, tmp_path)
 
 
+def testSeedsOfNoise(tmp_path):
+    """Of their own for each scene and seed, the same wherever they are asked, and what setRandomNumberSeed() takes."""
+    seeds = [ensemble.Run({"beads": n}, seed, tmp_path).noiseSeed for n in range(20) for seed in range(1, 21)]
+    assert len(set(seeds)) == 400 and min(seeds) > 0 and max(seeds) < 2**31
+    assert ensemble.Run({"beads": 4}, 7, tmp_path / "x").noiseSeed == seeds[4 * 20 + 6] == 1220271873
+    chain(max(seeds))
+
+
 def testNamesOfFolders():
     assert ensemble._name({"beads": 10, "box": 2.5}, 3).startswith("beads=10_box=2.5-")
     assert ensemble._name({"a": 1, "b": 2}, 1) == ensemble._name({"b": np.int64(2), "a": 1}, 1)

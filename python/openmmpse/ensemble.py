@@ -55,7 +55,18 @@ class Run:
         self._series = None
 
     @property
+    def noiseSeed(self):
+        """A seed for random numbers of its own for each scene and seed, from 1 to 2^31 - 1.
+
+        The integrator's noise depends on its seed, the step and the particle alone. With run.seed runs of different
+        scenes share it: differences between scenes get smaller errors, but results of scenes are not independent.
+        """
+        digest = hashlib.sha256(f"{_text(self.scene)} {self.seed}".encode()).digest()
+        return 1 + int.from_bytes(digest[:8], "little") % (2**31 - 1)
+
+    @property
     def attempt(self):
+        """1, and one more each time that the run is begun again."""
         path = self.folder / ATTEMPTS
         return len(path.read_text(encoding="utf-8").splitlines()) if path.exists() else 0
 
@@ -148,7 +159,7 @@ def runEnsemble(simulate, scenes, seeds, folder, client=None, threads=1, retries
         plain values that describe what to simulate: numbers, texts, dicts or lists of them. Keys of dicts become
         columns of the table
     seeds : int or list of int
-        positive numbers, or how many of them, from 1; give run.seed to the integrator
+        positive numbers, or how many of them, from 1; give run.noiseSeed or run.seed to the integrator
     folder : path
         of all files; all workers must see it. What is finished in there is not done again, so the same call goes on
         where it was interrupted, or adds scenes and seeds: take a new folder for another `simulate`
@@ -273,15 +284,20 @@ def _seeds(seeds):
 
 def _name(scene, seed):
     """Folder of a run: readable, and different for different scenes."""
+    text = _text(scene)
+    words = re.sub(r"[^A-Za-z0-9.=+-]+", "_", text.replace('": ', "=")).strip("_")[:48]
+    return f"{words}-{hashlib.sha256(text.encode()).hexdigest()[:8]}-seed{seed}"
+
+
+def _text(scene):
+    """The same text for the same scene, everywhere."""
     try:
-        text = json.dumps(scene, sort_keys=True, default=_plain)
+        return json.dumps(scene, sort_keys=True, default=_plain)
     except TypeError:
         raise TypeError(
             f"scene {scene!r}: expected numbers, texts, or lists and dicts of them, which can be told apart on every "
             "machine; give what describes a System, and build it in simulate()"
         ) from None
-    words = re.sub(r"[^A-Za-z0-9.=+-]+", "_", text.replace('": ', "=")).strip("_")[:48]
-    return f"{words}-{hashlib.sha256(text.encode()).hexdigest()[:8]}-seed{seed}"
 
 
 def _machine(context):
