@@ -28,14 +28,14 @@ CHAINS = 64  #: independent chains behind a diffusion coefficient
 MEMORY = 0.05  #: by which a mode in a fluid may be slower than it begins
 
 
-def expected(count, hydrodynamics):
+def expected(count, hydrodynamics, radius=RADIUS, bond=BOND):
     """Diffusion coefficient (nm^2/ps), relaxation time (ps) and vector (N,) of the mode."""
     mode = np.cos(math.pi * (np.arange(count) + 0.5) / count) * math.sqrt(2 / count)
-    stiffness = 4 * SPRING * math.sin(math.pi / (2 * count))**2
+    stiffness = 4 * 3 * KT / bond**2 * math.sin(math.pi / (2 * count))**2
     if not hydrodynamics:
-        return KT * mobility(RADIUS) / count, 1 / (mobility(RADIUS) * stiffness), mode
+        return KT * mobility(radius) / count, 1 / (mobility(radius) * stiffness), mode
     # sums over all pairs of ever longer chains: second differences are the mean mobility of a pair
-    sums = [n**2 * analysis.gaussianChainKirkwood(n, BOND, RADIUS, VISCOSITY, KT) / KT for n in range(1, count + 1)]
+    sums = [n**2 * analysis.gaussianChainKirkwood(n, bond, radius, VISCOSITY, KT) / KT for n in range(1, count + 1)]
     row = np.diff([0, 0, *sums], n=2) / 2
     row[0] *= 2  # a bead and itself are one pair, not two
     matrix = row[abs(np.subtract.outer(np.arange(count), np.arange(count)))]

@@ -9,6 +9,7 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy import stats
 
@@ -62,6 +63,28 @@ def testCollapse(tmp_path):
     """Hydrodynamic interactions make it faster, by more than chance may (the errors have 11 degrees of freedom)."""
     last = rowsOf("collapse", tmp_path)[-1]
     assert stats.t.sf((last.value - 1)/last.error, last.degrees) < 1e-2
+
+
+def testShearedDna(tmp_path):
+    """Flow stretches: at Wi = 3 by more than half as much again, of which the errors are a twentieth."""
+    rows = {row.quantity: row.value for row in rowsOf("sheared_dna", tmp_path)}
+    assert rows["DNA, Wi = 3: stretch"] > 1.5*rows["DNA, Wi = 0: stretch"]
+
+
+def testGel(tmp_path):
+    """Spheres aggregate in both solvents."""
+    start, *ends = rowsOf("gel", tmp_path)
+    for end in (row for row in ends if row.quantity.startswith("contacts")):
+        assert end.value > 4*start.value
+
+
+def testStructureOfAGel():
+    """Three spheres in a row through a face of the box, a pair, and one alone."""
+    gel = importlib.import_module("gel")
+    x = np.array([[9.0, 1, 1], [1.1, 1, 1], [3.2, 1, 1], [5, 7, 5], [5, 5, 5], [8, 8, 8]])
+    contacts, labels = gel.structure(x, 10.0)
+    assert contacts.tolist() == [1, 2, 1, 1, 1, 0]
+    assert labels.tolist() == [0, 0, 0, 3, 3, 5]
 
 
 def testProteinDiffusion(tmp_path):
