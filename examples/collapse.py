@@ -13,7 +13,7 @@ are done, in chains so short that exponents may differ from those by 0.4.
 """
 import numpy as np
 import openmm
-from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plt, positionsOf, save
+from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
 from tqdm import tqdm
 
 RADIUS, BOND, DEPTH, RANGE = 0.5, 1.0, 2.0, 0.25  #: nm, nm, kT, and range of the attraction in nm
@@ -99,15 +99,18 @@ def run(options):
             radii, last = found[-1]
             axes[1].plot(np.arange(radii.shape[1]) * RECORD / 1000, radii.mean(axis=0), color=color, label=name)
             axes[2].errorbar(counts, times[wet] / 1000, errors[wet] / 1000, fmt="o-", color=color)
-            axes[0].scatter(*(last - last.mean(axis=0) + [0 if wet else 12, 0, 0])[:, :2].T, s=18, color=color)
+            last = last - last.mean(axis=0) + [0, 0 if wet else -8, 0]
+            axes[0].plot(last[:, 0], last[:, 1], "o-", ms=7, lw=1, color=color, mec="white")
     for i, count in enumerate(counts):
         ratio = times[False][i] / times[True][i]
         error = ratio * np.hypot(errors[True][i] / times[True][i], errors[False][i] / times[False][i])
         rows.append(Row(f"N = {count}: faster by a factor of", ratio, error, np.nan, "", 0.0, chains - 1))
     axes[0].set(aspect="equal", xlabel="nm", title="chains at the end")
-    axes[1].set(xlabel="time, ns", title=f"square radius of gyration, nm2, N = {counts[-1]}")
+    axes[1].set(xlabel="time, ns", title=f"Rg^2 of {counts[-1]} beads, nm2")
     axes[1].legend(title="hydrodynamics")
     axes[2].set(xscale="log", yscale="log", xlabel="beads", title="time of collapse, ns")
+    plainTicks(axes[2].xaxis, counts)
+    plainTicks(axes[2].yaxis, (2, 5, 10, 20, 50))
     save(figure, options, "collapse.png")
     return rows
 

@@ -14,10 +14,11 @@ from openmmpse import PSEBrownianIntegrator, analysis
 
 TEMPERATURE = 293.15  #: K
 VISCOSITY = 1.002 * analysis.MPA_S  #: water at 20 C, Da/(nm ps)
+FORCE = unit.kilojoule_per_mole / unit.nanometer
 KT = analysis.thermalEnergy(TEMPERATURE)  #: kJ/mol
 WET, DRY, THEORY = "#0072B2", "#D55E00", "#222222"  #: with and without hydrodynamic interactions, and expected
-STYLE = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-         "figure.constrained_layout.use": True, "svg.fonttype": "none", "savefig.dpi": 100}
+STYLE = {"axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+         "figure.constrained_layout.use": True}
 
 
 class Row(NamedTuple):
@@ -40,9 +41,8 @@ def meanOf(independent):
 
 def ratioOf(above, below):
     """The same of the ratio of two means over independent pairs of numbers (n,), to first order in their errors."""
-    above, below = np.asarray(above, dtype=float), np.asarray(below, dtype=float)
-    ratio = above.mean() / below.mean()
-    return ratio, *meanOf((above - ratio * below) / below.mean())[1:]
+    ratio = np.mean(above) / np.mean(below)
+    return ratio, *meanOf((np.asarray(above) - ratio * np.asarray(below)) / np.mean(below))[1:]
 
 
 def mobility(radius):
@@ -69,8 +69,7 @@ def positionsOf(context):
 
 def forcesOf(context):
     """(N, 3), kJ/(mol nm)."""
-    forces = context.getState(forces=True).getForces(asNumpy=True)
-    return forces.value_in_unit(unit.kilojoule_per_mole / unit.nanometer)
+    return context.getState(forces=True).getForces(asNumpy=True).value_in_unit(FORCE)
 
 
 def chain(count, force, parameters):
@@ -87,18 +86,19 @@ def chain(count, force, parameters):
 def table(rows):
     """The rows as lines of text."""
     width = max(len(row.quantity) for row in rows)
-    lines = [f"{'quantity':{width}}  {'simulated +- error':>22}  {'expected':>10}  by"]
-    for row in rows:
-        lines.append(f"{row.quantity:{width}}  {row.value:12.5g} +- {row.error:6.2g}  {row.expected:10.5g}  "
-                     f"{row.source}")
-    return "\n".join(lines)
+    head = f"{'quantity':{width}}  {'simulated +- error':>22}  {'expected':>10}  by"
+    return "\n".join([head] + [f"{row.quantity:{width}}  {row.value:12.5g} +- {row.error:6.2g}  {row.expected:10.5g}  "
+                               f"{row.source}" for row in rows])
+
+
+def plainTicks(axis, values):
+    """Ticks of a logarithmic axis at these values alone, as plain numbers."""
+    axis.set(major_locator=plt.FixedLocator(values), minor_locator=plt.NullLocator(), major_formatter="{x:g}")
 
 
 def save(figure, options, name):
     """Write a picture into the output folder."""
-    options.output.mkdir(parents=True, exist_ok=True)
     figure.savefig(options.output / name)
-    plt.close(figure)
 
 
 def main(run, description, argv=None, more=()):
@@ -111,6 +111,7 @@ def main(run, description, argv=None, more=()):
     for name, arguments in more:
         parser.add_argument(name, **arguments)
     options = parser.parse_args(argv)
+    options.output.mkdir(parents=True, exist_ok=True)
     plt.switch_backend("Agg")
     with plt.rc_context(STYLE):
         rows = run(options)

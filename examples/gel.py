@@ -71,7 +71,7 @@ def aggregate(x, edge, records, hydrodynamics, options, bar):
 
 
 def run(options):
-    count, records, copies = (80, 4, 4) if options.short else (300, 40, 4)
+    count, records, copies = (80, 3, 4) if options.short else (300, 40, 4)
     edge = (count * 4 * np.pi / 3 * RADIUS**3 / PHI)**(1 / 3)
     generator = np.random.default_rng(options.seed)
     rows, results = [], {}
@@ -98,9 +98,9 @@ def run(options):
     axes[1].legend(title="hydrodynamics")
     x = results[True][-1][1]
     labels = np.unique(structure(x, edge)[1], return_inverse=True)[1]
-    order = (x % edge)[:, 1].argsort()[::-1]
-    axes[0].scatter(*(x % edge)[order][:, [0, 2]].T, s=60, c=labels[order] % 20, cmap="tab20", lw=0)
-    axes[0].set(aspect="equal", xticks=[], yticks=[], title="clusters, with hydrodynamics")
+    order = [i for i in (x % edge)[:, 1].argsort()[::-1] if x[i, 1] % edge < edge / 2]
+    axes[0].scatter(*(x % edge)[order][:, [0, 2]].T, s=230, c=labels[order] % 20, cmap="tab20", edgecolors="white")
+    axes[0].set(aspect="equal", xticks=[], yticks=[], title="clusters in half the box, with hydrodynamics")
     save(figure, options, "gel.png")
     return rows
 

@@ -104,7 +104,7 @@ def draw(protein, points, curve, rigid, law, free, options):
     right.axhline(law * SI, color=THEORY, ls=":", label="Wilkins et al. 1999")
     right.axhline(free.value, color=DRY, label="simulated, without hydrodynamics")
     right.set(xlabel="time, ps", title="diffusion coefficient, 1e-10 m2/s", ylim=(0, 1.5 * rigid * SI))
-    right.legend(loc="center right")
+    right.legend(loc="center right", bbox_to_anchor=(1, 0.35))
     save(figure, options, "protein_diffusion.png")
 
 

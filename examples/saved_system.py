@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import openmm
-from common import DRY, THEORY, VISCOSITY, WET, Row, main, meanOf, mobility, plt, save
+from common import DRY, FORCE, THEORY, VISCOSITY, WET, Row, main, meanOf, mobility, plainTicks, plt, save
 from openmm import app, unit
 from protein_diffusion import MEASURED, RADIUS, RIGID, longTime
 from tqdm import tqdm
@@ -31,7 +31,6 @@ from openmmpse import PSEBrownianIntegrator, analysis
 TEMPERATURE = 0.5 / 0.00831446261815324  #: K; kT = 0.5 kJ/mol, the reduced temperature of the model
 STEP, BROWNIAN_STEP = 0.25, 0.04  #: ps; beads that drag each other along relax slower, so longer steps are stable
 OPTIONS = [("files", {"nargs": "*", "help": "a System as XML and coordinates as .gro"})]
-FORCE = unit.kilojoule_per_mole / unit.nanometer
 
 
 def byOpenSMOG(folder):
@@ -70,12 +69,11 @@ def record(system, positions, integrator, step, records, interval, options, bar)
 
 
 def run(options):
-    options.output.mkdir(parents=True, exist_ok=True)
     file, coordinates = options.files or byOpenSMOG(options.output)
     system = openmm.XmlSerializer.deserialize(Path(file).read_text())
     positions = app.GromacsGroFile(coordinates).getPositions(asNumpy=True)
     count = len(positions)
-    records, lag, blocks, late = (3000, 100, 20, 0.07) if options.short else (60000, 2000, 12, RIGID)
+    records, lag, blocks, late = (3000, 100, 20, 0.07) if options.short else (60000, 1000, 12, RIGID)
     kT = analysis.thermalEnergy(TEMPERATURE)
     scale = kT * mobility(1.0)
     friction = 1 / (mobility(RADIUS) * system.getParticleMass(0).value_in_unit(unit.dalton))
@@ -107,6 +105,7 @@ def run(options):
     axis.axhline(scale / rigid, color=THEORY, lw=1, label="rigid bodies")
     axis.axhline(rows[-1].expected, color=THEORY, ls=":", label="Wilkins et al. 1999")
     axis.set(xscale="log", yscale="log", xlabel="time, ps", title=f"hydrodynamic radius of {count} residues, nm")
+    plainTicks(axis.yaxis, (1, 2, 5, 10, 20, 50))
     axis.legend(loc="center right")
     save(figure, options, "saved_system.png")
     return rows

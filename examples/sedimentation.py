@@ -99,7 +99,7 @@ def run(options):
     right.axhline(1, color="#D55E00", lw=1)
     right.annotate("without hydrodynamics", (0.45, 1), ha="right", va="bottom", color="#D55E00")
     right.set(xlabel="volume fraction phi", title="settling velocity over that of one sphere", ylim=(0, 1.1))
-    right.legend()
+    right.legend(loc="center right", bbox_to_anchor=(1, 0.65))
     save(figure, options, "sedimentation.png")
     return rows
 

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 import openmm
-from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plt, positionsOf, save
+from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
 from tqdm import tqdm
 from zimm_and_rouse import expected
 
@@ -78,12 +78,12 @@ def blocked(series, blocks=20):
 
 
 def run(options):
-    numbers, times = ([0, 3], 40) if options.short else ([0, 1, 3, 10, 30, 100], 150)
+    numbers, times = ([0, 3], 25) if options.short else ([0, 1, 3, 10, 30, 100], 150)
     linear = chain(COUNT, openmm.HarmonicBondForce(), (0.0, SPRING))
     rows, found = [], []
     with tqdm(desc="steps", unit_scale=True, disable=None) as bar:
         wi, tau = 2.0, expected(COUNT, False, RADIUS, BOND)[1]
-        ends = shear(linear, wi, False, 4 * times, 0.02, options, bar)[0]
+        ends = shear(linear, wi, False, 4 * times, 0.04, options, bar)[0]
         value, error, degrees = blocked((ends**2).sum(axis=1) / rouse(0))
         rows.append(Row("Rouse chain, Wi = 2: <R^2>/<R^2>0", value, error, rouse(2 * wi / tau) / rouse(0), "modes",
                         0.02 * value, degrees))
@@ -92,11 +92,10 @@ def run(options):
             ends, stretch, shapes = shear(wormlike(), wi, True, much, fraction, options, bar)
             found.append((*blocked(stretch / ((COUNT - 1) * LENGTH)), shapes[-1]))
             if wi == 0:
-                value, error, degrees = blocked((ends**2).sum(axis=1) / atRest())
+                value, error, _ = blocked((ends**2).sum(axis=1) / atRest())
                 rows.append(Row("DNA at rest: <R^2>/quadrature", value, error, 1.0, "quadrature", 0.02, degrees))
-            high = wi >= 100
-            rows.append(Row(f"DNA, Wi = {wi}: stretch", *found[-1][:2], PUBLISHED if high else np.nan,
-                            "Smith et al." if high else "", SPREAD, found[-1][2]))
+            rows.append(Row(f"DNA, Wi = {wi}: stretch", *found[-1][:2], PUBLISHED if wi >= 100 else np.nan,
+                            "Smith et al." if wi >= 100 else "", SPREAD, degrees))
     draw(numbers, found, options)
     return rows
 
@@ -105,12 +104,14 @@ def draw(numbers, found, options):
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.6), width_ratios=(1.3, 1))
     for i, (wi, (*_, x)) in enumerate(zip(numbers, found)):
         left.plot(x[:, 0] / 1000, x[:, 1] / 1000 - 3 * i, "o-", color=WET, ms=3, lw=1)
-        left.annotate(f"Wi = {wi}", (-11, -3 * i), va="center")
-    left.set(aspect="equal", xlim=(-11, 11), xlabel="um, along the flow", yticks=[], title="snapshots")
+        left.annotate(f"Wi = {wi}", (-13, -3 * i), va="center")
+    left.set(aspect="equal", xlim=(-13, 11), xlabel="um, along the flow", yticks=[], title="snapshots")
+    left.spines["left"].set_visible(False)
     right.errorbar(numbers, [f[0] for f in found], [f[1] for f in found], fmt="o-", color=WET)
     right.axhspan(0.4, 0.5, color=DRY, alpha=0.2, lw=0)
     right.annotate("measured at high Wi", (0, 0.51), color=DRY)
     right.set(xscale="symlog", ylim=(0, 0.7), xlabel="Wi", title="mean stretch over contour length")
+    plainTicks(right.xaxis, numbers)
     save(figure, options, "sheared_dna.png")
 
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 import openmm
-from common import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plt, ratioOf
+from common import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plainTicks, plt, ratioOf
 from common import chain, fluid, forcesOf, main, positionsOf, save
 from tqdm import tqdm
 
@@ -57,8 +57,8 @@ def follow(count, replicas, hydrodynamics, options, bar):
     _, tau, mode = expected(count, hydrodynamics)
     step = min((0.03 if hydrodynamics else 0.1) / (SPRING * mobility(RADIUS)), tau / RECORDS / 4)
     interval = round(tau / RECORDS / step)
-    context, integrator = fluid(chain(count, openmm.HarmonicBondForce(), (0.0, SPRING)), RADIUS, step, options,
-                                hydrodynamics, seed=count, threads=2 if count >= 100 else 1)
+    system = chain(count, openmm.HarmonicBondForce(), (0.0, SPRING))
+    context, integrator = fluid(system, RADIUS, step, options, hydrodynamics, seed=count, threads=1 + (count >= 100))
     generator = np.random.default_rng([options.seed, count])
     found = diffusion(integrator, context, [polymer.equilibrium(generator, count, BOND) for _ in range(CHAINS)], step)
     lost, begun = [], []
@@ -89,28 +89,28 @@ def exponent(counts, values, errors, exact):
 
 
 def run(options):
-    counts, replicas = ([10, 20, 30], [40] * 3) if options.short else ([10, 30, 100, 300], [256, 128, 32, 5])
-    d0, rows = KT * mobility(RADIUS), []
-    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.8))
+    counts, replicas = ([10, 20, 30], [30] * 3) if options.short else ([10, 30, 100, 300], [256, 128, 32, 5])
+    rows, (figure, axes) = [], plt.subplots(1, 2, figsize=(8.6, 3.8))
     with tqdm(desc="chains", unit=" bead steps", unit_scale=True, disable=None) as bar:
         for name, wet, color in (("Zimm", True, WET), ("Rouse", False, DRY)):
             found = np.array([follow(*pair, wet, options, bar) for pair in zip(counts, replicas)])
-            theories = np.array([expected(count, wet)[:2] for count in counts])
-            for column, (what, unit, slack) in enumerate((("D/D0", d0, 0), ("tau, ns", 1000, MEMORY * wet))):
-                (value, error, degrees), exact = found[:, column].T, theories[:, column]
+            quantities = ("D/D0", KT * mobility(RADIUS), 0.0), ("tau, ns", 1000.0, MEMORY * wet)
+            for column, (what, unit, slack) in enumerate(quantities):
+                (value, error, degrees), exact = found[:, column].T, [expected(n, wet)[column] for n in counts]
                 for i, count in enumerate(counts):
                     rows.append(Row(f"{name}, N = {count}: {what}", value[i] / unit, error[i] / unit, exact[i] / unit,
-                                    "Kirkwood" if wet and not column else "first decay" if wet else "Rouse",
-                                    slack * exact[i] / unit, int(degrees[i])))
+                                    ("Kirkwood", "first decay")[column] if wet else "Rouse", slack * exact[i] / unit,
+                                    degrees[i]))
                 slope, *others = exponent(counts, value, error, exact)
                 rows.append(Row(f"{name}: exponent of {what.split(',')[0]}", slope, *others, "the same",
-                                slack / math.log(3), int(degrees.min())))
+                                slack / math.log(3), degrees.min()))
                 axes[column].errorbar(counts, value / unit, error / unit, fmt="o", color=color,
                                       label=f"{name}, exponent {slope:.2f}")
-                axes[column].plot(counts, exact / unit, color=color, lw=1)
+                axes[column].plot(counts, np.divide(exact, unit), color=color, lw=1)
     for axis, title in zip(axes, ("diffusion coefficient over that of a bead", "relaxation time of the chain, ns")):
         axis.set(xscale="log", yscale="log", xlabel="beads", title=title)
         axis.legend()
+        plainTicks(axis.xaxis, counts)
     save(figure, options, "zimm_and_rouse.png")
     return rows
 
