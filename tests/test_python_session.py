@@ -58,7 +58,7 @@ def odd():
 def settings(integrator):
     """Everything that can be set, by name of the getter. Quantities compare exactly."""
     getters = [name for name in dir(integrator) if name.startswith("get")]
-    bound = ("getNumericalParameters", "getStrain")
+    bound = ("getNumericalParameters", "getStageTimes", "getStrain")
     needArgument = ("getParticleRadius",)
     return {
         name: getattr(integrator, name)() for name in getters if name not in bound + needArgument

@@ -22,13 +22,21 @@ COUNT, BOX, RADIUS, STEP, RATE = 30, 5.0, 0.4, 0.25, 2e-3
 FIXED = ("step", "time_ps", "lanczos_iterations", "predicted_error")
 
 
-def springs():
+def repulsion():
     """A soft repulsion, which has a stress."""
     force = openmm.CustomNonbondedForce("20*(1-r)^2*step(1-r)")
     force.setNonbondedMethod(force.CutoffPeriodic)
     force.setCutoffDistance(1.1)
     for _ in range(COUNT):
         force.addParticle([])
+    return force
+
+
+def bonds():
+    """Forces without a box."""
+    force = openmm.HarmonicBondForce()
+    for i in range(COUNT - 1):
+        force.addBond(i, i + 1, 1.0, 50.0)
     return force
 
 
@@ -41,8 +49,7 @@ def simulationOn(platformName, integrator=None, configure=lambda integrator: Non
     for _ in range(COUNT):
         system.addParticle(1)
         topology.addAtom("S", None, topology.addResidue("S", chain))
-    if periodic:
-        system.addForce(springs())
+    system.addForce(repulsion() if periodic else bonds())
     if integrator is None:
         integrator = PSEBrownianIntegrator(300, 600, RADIUS, STEP)
         integrator.setRandomNumberSeed(4)
