@@ -20,7 +20,7 @@ from sphinx.util.docutils import SphinxDirective
 from openmmpse import __main__ as commandLine
 
 LOGGER = logging.getLogger(__name__)
-OPTIONAL = {"examples", "analysis", "reporter", "ensembles", "packaging"}
+OPTIONAL = {"examples"}
 os.environ["COLUMNS"] = "88"  # of the help of commands
 openmmpse.PSEBrownianIntegrator.__module__ = "openmmpse.binding"  # where autodoc finds the comments of constants
 
