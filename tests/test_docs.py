@@ -25,7 +25,7 @@ import publicnames  # noqa: E402
 
 PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 FOLDERS = "benchmarks|cmake|docs|examples|numerics|openmmapi|packaging|platforms|python|serialization|tests"
-FILE = re.compile(rf"(?:{FOLDERS})/[\w/.-]+\.(?:cc|cff|cmake|cpp|csv|h|i|json|md|png|py|svg|toml|txt)\b")
+FILE = re.compile(rf"(?<![\w/.-])(?:{FOLDERS})/[\w/.-]+\.(?:cc|cff|cmake|cpp|csv|h|i|json|md|png|py|svg|toml|txt)\b")
 SHORT = {
     "quick-start": ("FRAMES, STEPS = 2000, 100", "FRAMES, STEPS = 200, 20"),  # 20 ns instead of 1000
     "reporter": ("COUNT, EDGE, STEPS = 300, 8.0, 3000", "COUNT, EDGE, STEPS = 60, 5.0, 60"),
