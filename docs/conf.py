@@ -26,6 +26,7 @@ extensions = [
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 nitpicky = True
+smartquotes = False  # options begin with two dashes
 # Names of others (OpenMM, NumPy, plain words in the type of an argument) are not links; ours must be.
 nitpick_ignore_regex = [("py:.*", r"(?!openmmpse\b).*")]
 default_role = "py:obj"  # what docstrings put between single backticks: code, and a link where it is a name

@@ -36,17 +36,17 @@ def commentOf(module, name):
 
 
 def entriesOf(moduleName, module):
-    """Lines of reStructuredText for all that a module makes public, classes first."""
+    """Lines of reStructuredText for all that a module makes public: functions, classes, constants."""
     kinds = {"autoclass": [], "autofunction": [], "data": []}
     for name in module.__all__:
         value = getattr(module, name)
         kind = "autoclass" if inspect.isclass(value) else "autofunction" if callable(value) else "data"
         kinds[kind].append(name)
     lines = []
-    for name in kinds["autoclass"]:
-        lines += [f".. autoclass:: {moduleName}.{name}", "   :members:", "   :undoc-members:", ""]
     for name in kinds["autofunction"]:
         lines += [f".. autofunction:: {moduleName}.{name}", ""]
+    for name in kinds["autoclass"]:
+        lines += [f".. autoclass:: {moduleName}.{name}", "   :members:", "   :undoc-members:", ""]
     for name in kinds["data"]:
         comment = plaindocstrings.reStructured(commentOf(module, name))
         lines += [f".. py:data:: {name}", f"   :value: {getattr(module, name)!r}", ""]

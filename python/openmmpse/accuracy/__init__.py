@@ -6,7 +6,8 @@
     print(result.recommended)
     print(openmmpse.accuracy.recommendStep(context, bias=0.01))
 
-On the command line: python -m openmmpse accuracy SYSTEM.xml STATE.xml INTEGRATOR.xml --run-length STEPS
+On the command line: `python -m openmmpse accuracy SYSTEM.xml STATE.xml INTEGRATOR.xml --run-length STEPS`.
+
 docs/accuracy-and-speed.md explains the columns and the recommendation.
 """
 
