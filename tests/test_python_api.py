@@ -567,7 +567,7 @@ def testEveryMethodIsDocumented():
             assert "Raises" in text and "Parameters" in text, name
     assert "Pa s" in PSEBrownianIntegrator.__init__.__doc__
     assert PSEBrownianIntegrator.__module__ == "openmmpse"
-    assert openmmpse.__all__ == ["PSEBrownianIntegrator"]
+    assert openmmpse.__all__ == ["HydrodynamicsReporter", "PSEBrownianIntegrator"]
 
 
 def exampleIn(text):
