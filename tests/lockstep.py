@@ -56,6 +56,7 @@ class Party:
 
     def __init__(self, platformName, system, integrator):
         self.platformName, self.integrator = platformName, integrator
+        self.stepped = False # since the Context was made
         self.context = contextOn(platformName, system, integrator, 1)
 
     @property
@@ -233,6 +234,7 @@ class Lockstep:
     def singleStep(self):
         start, box = self.shadow.positions, self.shadow.box
         self.shadow.integrator.step(1)
+        self.shadow.stepped = True
         moved = self.shadow.positions - start
         self.followPlan()
         self.oracle.put(start, box)
@@ -338,6 +340,11 @@ class Lockstep:
             if not last:
                 subject.integrator.step(steps)
                 assert same(after, subject.condition()), "a checkpoint does not repeat the steps"
+        if not self.shadow.stepped: # whether a box that is set next is another one counts from the first step
+            data = self.shadow.context.createCheckpoint()
+            self.shadow.integrator.step(steps)
+            self.shadow.context.loadCheckpoint(data)
+            self.shadow.stepped = True
         subject.context.setVelocities(before[1])
         self.shadow.context.setVelocities(before[1])
         self.meetBox()
@@ -385,6 +392,7 @@ class Lockstep:
         positions, box = self.shadow.positions, self.shadow.box
         for party in (self.subject, self.shadow):
             party.context.reinitialize(preserved)
+            party.stepped = False
             if not preserved:
                 party.put(positions, box)
         if not preserved:
