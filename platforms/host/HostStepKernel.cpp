@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "HostStepKernel.h"
 #include "openmm/internal/ContextImpl.h"
-#include <algorithm>
 #include <cmath>
 
 using namespace PSE::numerics;
@@ -62,39 +61,47 @@ vector<OmmVec3> HostStepKernel::scattered(const vector<Vec3>& mobile, double sca
     return all;
 }
 
-double HostStepKernel::requireFinite(const vector<Vec3>& values,
-                                     const CheckedQuantity& quantity) const {
-    Vec3 sum = Vec3::Zero(), largest = Vec3::Zero();
-    for (const Vec3& value : values) {
+void HostStepKernel::requireFinite(const vector<Vec3>& values,
+                                   const CheckedQuantity& quantity) const {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& value : values)
         sum += 0.0 * value; // not a number as soon as one of them is not finite
-        largest = largest.cwiseMax(value.cwiseAbs());
-    }
-    if (sum != Vec3::Zero())
-        for (size_t i = 0; i < values.size(); i++)
-            if (!values[i].allFinite())
-                refuseNotFinite(quantity, scene.mobile[i], values[i]);
-    return largest.maxCoeff();
+    if (sum == Vec3::Zero())
+        return;
+    for (size_t i = 0; i < values.size(); i++)
+        if (!values[i].allFinite())
+            refuseNotFinite(quantity, scene.mobile[i], values[i]);
 }
 
 double HostStepKernel::checkedVelocities(ContextImpl& context, double dt) const {
-    const double largest = requireFinite(velocities, VELOCITY);
-    if (mayBlowUp(largest, dt)) {
+    requireFinite(velocities, VELOCITY);
+    Vec3 largest = Vec3::Zero();
+    for (const Vec3& velocity : velocities)
+        largest = largest.cwiseMax(velocity.cwiseAbs());
+    if (mayBlowUp(largest.maxCoeff(), dt)) {
         vector<OfParticle> all;
         for (size_t i = 0; i < velocities.size(); i++)
             all.emplace_back(scene.mobile[i], velocities[i]);
         refuseBlowUp(context, all, dt);
     }
-    return largest;
+    return largest.maxCoeff();
+}
+
+void HostStepKernel::refusePlaces(const CheckedQuantity& quantity, bool next) const {
+    requireFinite(positions, quantity);
+    for (size_t i = 0; i < positions.size(); i++)
+        if (positions[i].cwiseAbs().maxCoeff() > farthestPosition())
+            refuseFarAway(scene.mobile[i], positions[i], next);
 }
 
 void HostStepKernel::checkNextPositions() const {
     const double farthest = farthestPosition();
-    if (requireFinite(positions, NEXT_POSITION) <= farthest)
-        return;
-    size_t i = 0;
-    while (positions[i].cwiseAbs().maxCoeff() <= farthest)
-        i++;
-    refuseFarAway(scene.mobile[i], positions[i], true);
+    bool fine = true;
+    for (const Vec3& x : positions)
+        for (int d = 0; d < 3; d++)
+            fine &= std::fabs(x[d]) <= farthest; // false for what is not a number
+    if (!fine)
+        refusePlaces(NEXT_POSITION, true);
 }
 
 void HostStepKernel::checkPositions(ContextImpl&) {
@@ -108,10 +115,7 @@ void HostStepKernel::checkPositions(ContextImpl&) {
     if (fine)
         return;
     gather(*data.positions, positions);
-    requireFinite(positions, POSITION);
-    for (size_t i = 0; i < positions.size(); i++)
-        if (positions[i].cwiseAbs().maxCoeff() > farthest)
-            refuseFarAway(scene.mobile[i], positions[i]);
+    refusePlaces(POSITION, false);
 }
 
 void HostStepKernel::computeForces(ContextImpl& context, int groups) {

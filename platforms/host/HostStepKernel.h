@@ -49,14 +49,13 @@ private:
     void followPositions();
     /** Add the flow of a strain to the step that positions and velocities are about to make. */
     void addFlow(double strain, double dt);
-    /**
-     * The largest component.
-     * @throws OpenMMException naming the first particle whose entry is not finite
-     */
-    double requireFinite(const std::vector<numerics::Vec3>& values,
-                         const CheckedQuantity& quantity) const;
+    /** @throws OpenMMException naming the first particle whose entry is not finite */
+    void requireFinite(const std::vector<numerics::Vec3>& values,
+                       const CheckedQuantity& quantity) const;
     /** The largest velocity component. Refuses, before anything moves, a step that is no good. */
     double checkedVelocities(OpenMM::ContextImpl& context, double dt) const;
+    /** Refuse what there is in `positions`, by its first particle. @param next  after a step */
+    void refusePlaces(const CheckedQuantity& quantity, bool next) const;
     /** The same, of where particles would be then. */
     void checkNextPositions() const;
     /** The entries of mobile particles. */
