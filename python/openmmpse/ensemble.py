@@ -312,15 +312,15 @@ def _forgetLists(context, checkpoint):
     """Have OpenMM's CPU platform make its list of neighbours anew.
 
     It keeps a list while particles are near the places where it was made, whatever is loaded, and the order in it is
-    that in which forces are rounded. A period away, which changes no energy of a periodic System, it must make another
-    one, and back again, too.
+    that in which forces are rounded. Eight periods away, which changes no energy of a periodic System and is beyond the
+    room that lists of others have, it must make another one, and back again, too.
     """
     if context.getPlatform().getName() != "CPU":
         return
     state = context.getState(positions=True)
-    period = state.getPeriodicBoxVectors(asNumpy=True)[0]
+    shift = 8 * state.getPeriodicBoxVectors(asNumpy=True)[0]
     try:
-        context.setPositions(state.getPositions(asNumpy=True) + period)
+        context.setPositions(state.getPositions(asNumpy=True) + shift)
         context.getState(energy=True)
     except openmm.OpenMMException:
         pass  # a Force that minds the place; the list comes before
