@@ -7,6 +7,7 @@ the ratios within a group mean more than the times.
 """
 import argparse
 import re
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -106,8 +107,10 @@ def main():
     parser.add_argument("--particles", type=int, default=16000)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--processor-time", action="store_true", help="for machines with other work: with one thread")
     parser.add_argument("--output", type=Path, help="write the table here, too")
     arguments = parser.parse_args()
+    clock = time.process_time if arguments.processor_time else time.perf_counter
     lines = ["| scene | effects | ms per step | " + " | ".join(stages.PARTS) + " |", "|---|---|" + "---:|"*(1 + len(stages.PARTS))]
     print("\n".join(lines))
     for group in groups(arguments.particles):
@@ -115,7 +118,7 @@ def main():
             scene.start(arguments.threads)
         for _ in range(arguments.rounds):
             for scene in group:
-                scene.seconds.append(spheres.secondsPerStep([scene.integrator], scene.steps, 1)[0])
+                scene.seconds.append(spheres.secondsPerStep([scene.integrator], scene.steps, 1, clock)[0])
         for scene in group:
             total, cells = scene.row()
             numbers = " | ".join("-" if value == 0 else f"{value:.1f}" for value in cells.values())

@@ -22,8 +22,8 @@ constexpr double DROPPED_SHARE = REAL_BUDGET / BUDGET;
 /// of the tolerance, for the whole error: what the grid is finer than it need be, a shorter range
 /// may use up
 constexpr double PREDICTED_SHARE = 0.96;
-/// how closely that range is sought
-constexpr double RANGE_PRECISION = 0.01;
+/// how closely that range is sought, and how far
+constexpr double RANGE_PRECISION = 0.01, MOST_TIGHTENING = 1.25;
 constexpr double BANDWIDTH_STEP = 1.0 / 64; ///< as ProlatePlans
 /// of R/c: pairs may end before R + ai + aj by about the inverse of the largest wave number
 constexpr double CUT = 1.0;
@@ -325,7 +325,7 @@ std::string MixturePlans::checkTables(Plan& plan) const {
 
 Plan MixturePlans::refined(const Plan& plan) const {
     const PlanOverrides& wish = request.overrides;
-    if (!isProlate() || wish.bandwidth > 0 || wish.grid[0] > 0)
+    if (!isProlate() || wish.bandwidth > 0)
         return plan;
     Plan other = plan;
     const double R = plan.mixture->shape().range(), cut = R - plan.mixture->rangeOfPoints();
@@ -345,11 +345,11 @@ Plan MixturePlans::refined(const Plan& plan) const {
 
 Plan MixturePlans::tightened(const Plan& plan, double shortest) const {
     const PlanOverrides& wish = request.overrides;
-    if (!isProlate() || wish.bandwidth > 0 || wish.grid[0] > 0 || givenRange() > 0)
+    if (!isProlate() || wish.bandwidth > 0 || givenRange() > 0)
         return plan;
     const double allowed = PREDICTED_SHARE / BUDGET * error;
     Plan best = plan;
-    double high = plan.mixture->shape().range(), low = high / RANGE_FACTOR;
+    double high = plan.mixture->shape().range(), low = high / MOST_TIGHTENING;
     while (high - low > RANGE_PRECISION * high) {
         const double mid = 0.5 * (low + high);
         Plan other = refined(at(mid));

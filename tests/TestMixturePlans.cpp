@@ -222,6 +222,28 @@ TEST(MixturePlans, NeighboursAreCountedByTheRangesOfAllPairs) {
     EXPECT_LT(meanNeighbours(plan, r.box, 400), 0.8 * meanNeighbours(r.box, 400, plan.realCutoff));
 }
 
+TEST(MixturePlans, TheRangeIsTheShortestThatTheGridBears) {
+    std::vector<double> radii;
+    for (int i = 0; i < 500; i++)
+        radii.push_back(1 + 0.25 * (i % 5));
+    PlanRequest r = request(radii, 0.2, 1e-3);
+    for (double tolerance : {1e-3, 1e-4}) {
+        r.tolerance = tolerance;
+        r.overrides = {};
+        const Plan plan = makePlan(r);
+        EXPECT_GT(plan.predictedError, 0.8 * tolerance);
+        // 4 % less, whatever the bandwidth
+        const double range = 1 / plan.xi, shorter = 0.96 * range,
+                     cutoff = plan.realCutoff - (range - shorter);
+        for (double factor : {0.9, 0.95, 1.0}) {
+            r.overrides = {
+                1 / shorter,      cutoff, factor * plan.bandwidth, plan.grid, plan.windowSupport,
+                plan.windowShape, 0};
+            EXPECT_GT(makePlan(r).predictedError, tolerance) << factor;
+        }
+    }
+}
+
 TEST(MixtureErrors, WaveErrorBoundsTheMeasuredError) {
     std::mt19937 random(11);
     std::uniform_real_distribution<double> uniform;

@@ -50,6 +50,23 @@ void expectUncorrelated(const Sample& a, const Sample& b) {
 
 } // namespace
 
+// More than are computed together, and a rest.
+TEST(ParticleNoise, OfManyIsToTheBitThatOfEach) {
+    const NoiseKey key = {12345, Stream::StepReal, (uint64_t(3) << 32) + 7};
+    for (int n : {1, 16, 40}) {
+        std::vector<int> indices;
+        for (int i = 0; i < n; i++)
+            indices.push_back(3 * (n - i) + (i % 5 == 0 ? 1 << 30 : 0));
+        std::vector<std::array<double, 3>> many(n);
+        particleNoise(key, indices.data(), n, reinterpret_cast<double(*)[3]>(many.data()));
+        for (int i = 0; i < n; i++) {
+            std::array<double, 3> one;
+            particleNoise(key, uint32_t(indices[i]), one.data());
+            EXPECT_EQ(many[i], one) << n << " " << i;
+        }
+    }
+}
+
 TEST(Philox, GivesThePublishedKnownAnswers) {
     // Random123 1.14, tests/kat_vectors, lines "philox4x32 10".
     const uint32_t all = 0xffffffffu;

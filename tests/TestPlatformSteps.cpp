@@ -184,6 +184,48 @@ TEST(Continuation, FromACheckpointIsExact) {
     EXPECT_TRUE(identical(other.integrator.sampleBrownianDisplacements(1), drawn));
 }
 
+// In a box that holds the ranges of all pairs, where CPU expands rows of the window and lists
+// pairs.
+TEST(UnequalSpheres, StepAsOnOtherPlatformsAndContinueExactly) {
+    constexpr double TOLERANCE = 1e-3;
+    const int n = 100;
+    const Box box = rectangular(14, 15, 16);
+    const vector<Vec3> positions = randomPositions(n, box, 14);
+    Settings settings{box, TOLERANCE};
+    for (int i = 0; i < n; i++)
+        settings.radii.push_back(0.4 + 0.1 * (i % 5));
+    settings.force = repulsion;
+    const auto velocitiesOf = [&](Fluid& moved) {
+        moved.integrator.step(1);
+        return moved.velocities(); // displacements: of positions, single precision keeps too little
+    };
+    for (double temperature : {TEMPERATURE, 0.0}) {
+        SCOPED_TRACE(temperature);
+        settings.temperature = temperature;
+        settings.parameters = nullptr;
+        Fluid fluid(settings, positions);
+        const PSE::NumericalParameters plan = fluid.integrator.getNumericalParameters();
+        ASSERT_LT(plan.realCutoff, 7);
+        settings.parameters = &plan;
+        Fluid cpu("CPU", {}, settings, positions), reference("Reference", {}, settings, positions);
+        const vector<Vec3> ours = velocitiesOf(fluid), cpus = velocitiesOf(cpu),
+                           references = velocitiesOf(reference);
+        if (target.platform != "Reference") {
+            EXPECT_LE(relativeError(ours, cpus), TOLERANCE);
+        }
+        // Reference has no window, an error of first order in one vector of noise.
+        EXPECT_LE(relativeError(target.platform == "Reference" ? cpus : ours, references),
+                  temperature > 0 ? std::sqrt(TOLERANCE) : TOLERANCE);
+
+        const string checkpoint = fluid.checkpoint();
+        fluid.integrator.step(2);
+        const Witness uninterrupted(fluid);
+        fluid.load(checkpoint);
+        fluid.integrator.step(2);
+        EXPECT_TRUE(Witness(fluid) == uninterrupted);
+    }
+}
+
 TEST(Massless, ParticlesStayAndAreTransparent) {
     const int n = 60;
     const vector<Vec3> positions = randomPositions(n, ODD, 9);

@@ -101,6 +101,43 @@ def testErrorContract(platformName, name, split):
     assert not failures, "; ".join(failures)
 
 
+def clusterOfSmallOnes(radii, seed):
+    """Mean phi = 0.1, and all spheres of the smallest radius in one cluster of phi = 0.3."""
+    s = mixture(radii, 0.1, scenes.cube(1), seed)
+    rng = np.random.default_rng(seed + 1)
+    small = np.flatnonzero(s.radii == min(s.radii))
+    directions = rng.normal(size=(len(small), 3))
+    directions *= rng.random((len(small), 1))**(1/3)/np.linalg.norm(directions, axis=1)[:, None]
+    s.positions[small] = s.positions[small[0]] + min(s.radii)*(len(small)/0.3)**(1/3)*directions
+    return s, small
+
+
+def dipolesOn(s, chosen):
+    """Each of these spheres pushes its nearest neighbour among them and is pushed back."""
+    forces, near = np.zeros((s.count, 3)), s.positions[chosen]
+    distances = np.linalg.norm(near[:, None] - near, axis=2) + 1e9*np.eye(len(chosen))
+    for i, f in zip(range(len(chosen)), randomForces(s)):
+        forces[chosen[i]] += f
+        forces[chosen[np.argmin(distances[i])]] -= f
+    return forces
+
+
+@pytest.mark.parametrize("name, radii", [("1:2", twoSizes(0.5, 1.0, 0.9, 120)), ("1:10", twoSizes(0.25, 2.5, 0.9, 120)),
+                                         ("five", np.linspace(0.5, 1.0, 5)[np.arange(120) % 5])])
+def testClusterOfTheSmallestSpheres(platformName, name, radii):
+    """Errors are relative to the velocities of the whole cluster; the Plan knows of mean densities alone [T27]."""
+    if isDirect(platformName):
+        radii = radii[:40]
+    s, small = clusterOfSmallOnes(radii, 71)
+    alone = ofOneSize(s, min)
+    for tolerance in sorted({servedMixture(platformName, t) for t in (1e-2, 1e-3, 1e-5)}):
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        here = stored(s, context)
+        for kind, forces in {"random": alone, "dipoles": dipolesOn(s, small)}.items():
+            ratio = errorOf(integrator, forces, here)/tolerance
+            assert ratio <= 1, f"{kind} at {tolerance:g}: error {ratio:.2f} tolerance"
+
+
 @pytest.mark.parametrize("name", ["twoSizesOverlapping", "nested", "smallBox"])
 def testWorstForce(platformName, name):
     """The whole error matrix, forces measured by the velocities that they would give alone."""
