@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import openmm
 
 import spheres
 from openmmpse import PSEBrownianIntegrator

@@ -9,7 +9,7 @@ import pytest
 from openmm import app
 
 from openmmpse import demo
-from openmmpse.analysis import beads, estimate, finiteSizeCorrection
+from openmmpse.analysis import beads, finiteSizeCorrection
 from openmmpse.demo import network, protocol, report, statistics, structure, theory
 
 WATER = 1.002 * beads.MPA_S
