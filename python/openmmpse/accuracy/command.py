@@ -24,7 +24,7 @@ def main(argv=None):
     """Measure, print and write; returns the exit status: 0, 2 for bad input, 130 if interrupted."""
     options = _parser().parse_args(argv)
     try:
-        scene = load(options)
+        scene = load(options).requireFluid()
         bar = _Bar()
         if options.tune:
             return _tune(scene, options, bar)
