@@ -5,7 +5,7 @@ A parameter sweep: diffusion of ideal chains over their length and with several 
 Each run, a length with a seed, goes to a process of Dask distributed; whatever is interrupted goes on from its last
 checkpoint when the same command is given again. Runs of the same length make one number with an error bar.
 
-Expected: without hydrodynamics D0/N, with it a few percent less than Kirkwood's sum over the shapes that were seen,
+Expected: without hydrodynamics D0/N, with it less than Kirkwood's sum over the shapes that were seen,
 which is an upper bound of the diffusion coefficient at long times.
 """
 import argparse
