@@ -32,6 +32,9 @@ KEPT = {
         seed=50334, count=51, model="FreeDraining", phi=0.001324, tilts=(1.0, 1.0, -1.0), places="droplet",
         temperature=0.0, size=4.467e-05, repulsion=True, strain=0.241,
         calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
+}
+# The same, of what is decided on hosts.
+KEPT_ON_HOSTS = {
     "a Plan of CPU for unequal spheres in a tilted box that moves": RandomScene(
         seed=12254, split="Hasimoto", phi=2.085, edges=(3.589, 0.3911), tilts=(-0.63, 1.0, -1.0), places="chain",
         kinds=0, ratio=8.385, radius=2.792, temperature=0.0, tolerance=0.002284, size=0.07786, repulsion=True,
@@ -40,6 +43,9 @@ KEPT = {
     "a State saved in a box that the prescribed Plan does not fit": RandomScene(
         count=37, phi=0.003671, edges=(1.344, 2.065), bonds=True, repulsion=True, strain=0.353,
         calls=(("rate", 0.0), ("box", 1.035, 0.307), ("xml",), ("remake", 2.572e-06, 1.5))),
+    "a box set after a checkpoint of a Context without steps": RandomScene(
+        seed=16112, count=33, phi=0.006342, edges=(1.418, 0.8162), places="chain", massless=7, tolerance=1.315e-06,
+        size=1.149e-05, repulsion=True, calls=(("stress",), ("checkpoint", 1), ("box", 0.984, 0.128))),
 }
 
 ONE_PLACE = dict(seed=5, count=20, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
@@ -127,5 +133,18 @@ def testScenesThatFailedOnce(platformName, name, hardCase):
     The same, and none of them is refused.
     """
     lockstep = Lockstep(KEPT[name], platformName)
+    lockstep.run()
+    hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
+
+
+@pytest.mark.hostOnly
+@pytest.mark.parametrize("name", KEPT_ON_HOSTS)
+def testScenesThatFailedOnceOnHosts(platformName, name, hardCase):
+    """
+    Random scenes in which a Plan that one platform had chosen was refused, or a list of neighbours not the same.
+
+    The same, and none of them is refused.
+    """
+    lockstep = Lockstep(KEPT_ON_HOSTS[name], platformName)
     lockstep.run()
     hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
