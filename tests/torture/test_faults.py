@@ -221,7 +221,15 @@ def testStateOfAFutureVersion(platformName, hardCase):
     hardCase.measure(message=message)
 
 
-def testKeyboardInterrupt(platformName, hardCase):
+@pytest.fixture
+def interruptible():
+    """SIGINT raises KeyboardInterrupt also where a shell had it ignored, as of what runs in its background."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)
+
+
+def testKeyboardInterrupt(platformName, interruptible, hardCase):
     """
     SIGINT during a long call of step(), five times.
 
