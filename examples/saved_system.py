@@ -73,7 +73,7 @@ def run(options):
     system = openmm.XmlSerializer.deserialize(Path(file).read_text())
     positions = app.GromacsGroFile(coordinates).getPositions(asNumpy=True)
     count = len(positions)
-    records, lag, blocks, late = (3000, 100, 20, 0.07) if options.short else (60000, 1000, 12, RIGID)
+    records, lag, blocks, late = (3000, 100, 20, 0.07) if options.short else (60000, 2000, 12, RIGID)
     kT = analysis.thermalEnergy(TEMPERATURE)
     scale = kT * mobility(1.0)
     friction = 1 / (mobility(RADIUS) * system.getParticleMass(0).value_in_unit(unit.dalton))

@@ -23,7 +23,7 @@ from openmmpse.demo import polymer
 
 RADIUS, BOND = 0.5, 1.0  #: nm; root mean square length of a bond
 SPRING = 3 * KT / BOND**2
-LENGTH, SPAN = 0.6, 0.2  #: of a run, and over which the decay is taken, in relaxation times
+RECORDS, LAG = 40, 8  #: records per relaxation time, and how many of them the decay is taken over
 CHAINS = 64  #: independent chains behind a diffusion coefficient
 MEMORY = 0.05  #: by which a mode in a fluid may be slower than it begins
 
@@ -47,16 +47,16 @@ def diffusion(integrator, context, chains, step):
     values = []
     for x in chains:
         context.setPositions(x)
-        values.append((integrator.sampleBrownianDisplacements(50).mean(axis=1)**2).sum(axis=1).mean() / (6 * step))
+        centres = np.mean(integrator.sampleBrownianDisplacements(50), axis=1)
+        values.append((centres**2).sum(axis=1).mean() / (6 * step))
     return meanOf(values)
 
 
 def follow(count, replicas, hydrodynamics, options, bar):
     """(value, error, degrees of freedom) of the diffusion coefficient (nm^2/ps) and of the relaxation time (ps)."""
     _, tau, mode = expected(count, hydrodynamics)
-    every = tau / max(40, 2 * count)  # between records, so that motions of short parts of a chain average out
-    step = min((0.03 if hydrodynamics else 0.1) / (SPRING * mobility(RADIUS)), every / 4)
-    interval, lag = round(every / step), round(SPAN * tau / every)
+    step = min((0.03 if hydrodynamics else 0.1) / (SPRING * mobility(RADIUS)), tau / RECORDS / 4)
+    interval = round(tau / RECORDS / step)
     system = chain(count, openmm.HarmonicBondForce(), (0.0, SPRING))
     context, integrator = fluid(system, RADIUS, step, options, hydrodynamics, seed=count, threads=1 + (count >= 100))
     generator = np.random.default_rng([options.seed, count])
@@ -65,18 +65,18 @@ def follow(count, replicas, hydrodynamics, options, bar):
     for _ in range(replicas):
         context.setPositions(polymer.equilibrium(generator, count, BOND))
         x, v = [], []
-        for _ in range(round(LENGTH * tau / every) + 1):
+        for _ in range(3 * LAG + 1):
             x.append(mode @ positionsOf(context))
             v.append(mode @ integrator.applyMobility(forcesOf(context)))
             integrator.step(interval)
             bar.update(interval * count)
-        # noise does not know what was before it, so the drift alone tells how a mode is forgotten
-        x, v = np.array(x[:-lag]), np.array(v)
-        path = sum(v[i:len(x) + i] + v[i + 1:len(x) + i + 1] for i in range(lag)) * interval * step / 2
+        # noise does not know what was before it, so the drift alone tells how a mode is forgotten over LAG records
+        x, v = np.array(x[:-LAG]), np.array(v)
+        path = sum(v[i:len(x) + i] + v[i + 1:len(x) + i + 1] for i in range(LAG)) * interval * step / 2
         lost.append(-(x * path).sum())
         begun.append((x * x).sum())
     decay, error, degrees = ratioOf(lost, begun)
-    time = -(span := lag * interval * step) / math.log1p(-decay)
+    time = -(span := LAG * interval * step) / math.log1p(-decay)
     return found, (time, time**2 / span * error / (1 - decay), degrees)
 
 
@@ -89,7 +89,7 @@ def exponent(counts, values, errors, exact):
 
 
 def run(options):
-    counts, replicas = ([10, 20, 30], [30] * 3) if options.short else ([10, 30, 100, 300], [256, 128, 32, 4])
+    counts, replicas = ([10, 20, 30], [30] * 3) if options.short else ([10, 30, 100, 300], [256, 128, 32, 5])
     rows, (figure, axes) = [], plt.subplots(1, 2, figsize=(8.6, 3.8))
     with tqdm(desc="chains", unit=" bead steps", unit_scale=True, disable=None) as bar:
         for name, wet, color in (("Zimm", True, WET), ("Rouse", False, DRY)):
