@@ -20,7 +20,6 @@ from sphinx.util.docutils import SphinxDirective
 from openmmpse import __main__ as commandLine
 
 LOGGER = logging.getLogger(__name__)
-OPTIONAL = {"examples"}
 os.environ["COLUMNS"] = "88"  # of the help of commands
 openmmpse.PSEBrownianIntegrator.__module__ = "openmmpse.binding"  # where autodoc finds the comments of constants
 
@@ -92,15 +91,7 @@ def checkThatAllIsThere(app, env):
         LOGGER.warning("%s is public, but the reference does not have it", name, type="reference")
 
 
-def leaveOutMissingPages(app, name, source):
-    """The table of contents names pages that not every state of the sources has."""
-    if name == "index":
-        missing = OPTIONAL - app.env.found_docs
-        source[0] = "\n".join(line for line in source[0].splitlines() if line not in missing)
-
-
 def setup(app):
-    app.connect("source-read", leaveOutMissingPages)
     app.add_directive("publicmodules", PublicModules)
     app.add_directive("commandhelp", CommandHelp)
     app.connect("env-check-consistency", checkThatAllIsThere)
