@@ -3,13 +3,13 @@
 A colloidal gel forms: attractive spheres aggregate, with and without hydrodynamic interactions.
 
 Spheres at a volume fraction of 0.1 in a periodic fluid that attract each other by 8 kT at contact, from equilibrium of
-hard spheres on. Single spheres find each other, clusters stick together, and at last one network spans the box. The
+hard spheres on. Single spheres find each other, and clusters stick together. The
 solvent has to leave the gap between two clusters, and what moves together moves faster than each part would alone:
-hydrodynamic interactions keep clusters mobile while they are slow to compact, and open structures result (Furukawa and
+clusters stay mobile and are slow to compact, which in long runs of many spheres makes open structures (Furukawa and
 Tanaka 2010, Phys. Rev. Lett. 104, 245702; Varga, Wang and Swan 2015, Soft Matter 11, 9009).
 
-No number is published for this very model. Printed are the
-mean number of contacts of a sphere and the share of spheres in the largest cluster, at the end, in both solvents.
+No number is published for this very model, with so few spheres. Printed are the mean number of contacts of a sphere and
+the share of spheres in the largest cluster, at the end, in both solvents.
 Expected: the contacts at the beginning, 4 pi n times the integral of g r^2 over the range, with the contact value of
 Carnahan and Starling for g, which is lower by a few percent at the end of the range.
 """
@@ -100,7 +100,7 @@ def run(options):
     labels = np.unique(structure(x, edge)[1], return_inverse=True)[1]
     order = [i for i in (x % edge)[:, 1].argsort()[::-1] if x[i, 1] % edge < edge / 2]
     axes[0].scatter(*(x % edge)[order][:, [0, 2]].T, s=230, c=labels[order] % 20, cmap="tab20", edgecolors="white")
-    axes[0].set(aspect="equal", xticks=[], yticks=[], title="clusters in half the box, with hydrodynamics")
+    axes[0].set(aspect="equal", xticks=[], yticks=[], title="clusters in half the box")
     save(figure, options, "gel.png")
     return rows
 
