@@ -13,7 +13,7 @@ short chains, whose single exponents are smaller than those and are printed with
 """
 import numpy as np
 import openmm
-from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
+from shared import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
 from tqdm import tqdm
 
 RADIUS, BOND, DEPTH, RANGE = 0.5, 1.0, 2.0, 0.25  #: nm, nm, kT, and range of the attraction in nm

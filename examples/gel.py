@@ -15,7 +15,7 @@ Carnahan and Starling for g, which is lower by a few percent at the end of the r
 """
 import numpy as np
 import openmm
-from common import DRY, KT, WET, Row, fluid, main, meanOf, mobility, plt, positionsOf, save
+from shared import DRY, KT, WET, Row, fluid, main, meanOf, mobility, plt, positionsOf, save
 from sedimentation import lattice, sweep
 from tqdm import tqdm
 

@@ -14,7 +14,7 @@ matrices in NumPy); without hydrodynamics D0/N; and by measurements on folded pr
 0.475 N^0.29 nm (Wilkins et al. 1999, Biochemistry 38, 16424), from which single proteins differ by some 5 to 10 %.
 """
 import numpy as np
-from common import DRY, KT, THEORY, VISCOSITY, WET, Row, main, mobility, plt, save
+from shared import DRY, KT, THEORY, VISCOSITY, WET, Row, main, mobility, plt, save
 from tqdm import tqdm
 
 from openmmpse import analysis

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import openmm
-from common import DRY, FORCE, THEORY, VISCOSITY, WET, Row, main, meanOf, mobility, plainTicks, plt, save
+from shared import DRY, FORCE, THEORY, VISCOSITY, WET, Row, main, meanOf, mobility, plainTicks, plt, save
 from openmm import app, unit
 from protein_diffusion import MEASURED, RADIUS, RIGID, longTime
 from tqdm import tqdm

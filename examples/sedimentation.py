@@ -13,7 +13,7 @@ The distances that Percus and Yevick's theory gives to spheres are not exact: up
 """
 import numpy as np
 import openmm
-from common import THEORY, WET, Row, fluid, main, meanOf, mobility, plt, save
+from shared import THEORY, WET, Row, fluid, main, meanOf, mobility, plt, save
 from tqdm import tqdm
 
 from openmmpse import PSEBrownianIntegrator

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 import openmm
-from common import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
+from shared import DRY, KT, WET, Row, chain, fluid, main, meanOf, mobility, plainTicks, plt, positionsOf, save
 from tqdm import tqdm
 from zimm_and_rouse import expected
 

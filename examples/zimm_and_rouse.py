@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 import openmm
-from common import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plainTicks, plt, ratioOf
-from common import chain, fluid, forcesOf, main, positionsOf, save
+from shared import DRY, KT, VISCOSITY, WET, Row, meanOf, mobility, plainTicks, plt, ratioOf
+from shared import chain, fluid, forcesOf, main, positionsOf, save
 from tqdm import tqdm
 
 from openmmpse import analysis

@@ -18,8 +18,8 @@ ROOT = Path(__file__).resolve().parents[1]
 INTERVAL, STEPS, EVERY = 5, 100, 4  # a checkpoint each 20 steps
 
 
-def chain(seed, beads=12, platform="CPU"):
-    """A Context with a chain in a small periodic box, one thread."""
+def chain(seed, beads=12, platform="CPU", threads=None):
+    """A Context with a chain in a small periodic box. Several threads add OpenMM's forces in any order."""
     system = openmm.System()
     system.setDefaultPeriodicBoxVectors(*(8.0 * np.eye(3)))
     bonds, soft = openmm.HarmonicBondForce(), openmm.CustomNonbondedForce("20*(1-r)^2")
@@ -34,7 +34,7 @@ def chain(seed, beads=12, platform="CPU"):
     system.addForce(soft)
     integrator = PSEBrownianIntegrator(300.0, 600.0, 0.4, 2.0)
     integrator.setRandomNumberSeed(seed)
-    context = contextOn(platform, system, integrator)
+    context = contextOn(platform, system, integrator, threads)
     context.setPositions(0.9 * np.arange(beads)[:, None] * np.eye(3)[0])
     return context
 
@@ -82,9 +82,8 @@ def testAKilledWorkerLosesNothing(tmp_path):
     assert list(table["attempts"]) == [1, 2, 2, 2]
     assert list(table["error"]) == ["", "", "", "ValueError: no way out"]
     assert list(table["D_error"][:3]) == [0.5] * 3 and list(table["threads"][:3]) == ["1"] * 3
-    quiet = ensemble.Run({"kind": "quiet"}, 7, tmp_path / "alone")
-    wander(quiet)
-    exact = np.load(quiet.folder / "path.npy")
+    ensemble.perform(wander, {"kind": "quiet"}, 7, tmp_path / "alone")
+    exact = np.load(tmp_path / "alone" / "path.npy")
     assert exact.shape == (STEPS // INTERVAL, 12, 3) and np.ptp(exact[:, 0], axis=0).min() > 0
     for i in range(3):
         folder = tmp_path / "sweep" / ensemble._name(scenes[i], 7)
@@ -124,7 +123,7 @@ def testCheckpointsAndStates(platformName, tmp_path, monkeypatch, elsewhere):
     On the machine that wrote it a checkpoint is loaded, on another one the State. Both go on to the bit here, wherever
     in the life of a list of neighbours that is.
     """
-    run, context, follower = ensemble.Run("x", 5, tmp_path), chain(5, platform=platformName), None
+    run, context, follower = ensemble.Run("x", 5, tmp_path), chain(5, platform=platformName, threads=1), None
     assert run.restore(context) is None
     for step in (17, 34, 51, 68, 85):
         context.getIntegrator().step(17)
@@ -132,7 +131,7 @@ def testCheckpointsAndStates(platformName, tmp_path, monkeypatch, elsewhere):
             follower.getIntegrator().step(17)
             assert np.array_equal(positionsOf(follower), positionsOf(context))
         run.save(context, series=np.arange(3.0))
-        before, follower = positionsOf(context), chain(5, platform=platformName)
+        before, follower = positionsOf(context), chain(5, platform=platformName, threads=1)
         with monkeypatch.context() as patch:
             if elsewhere:
                 patch.setattr(ensemble, "_machine", lambda context: "another")
