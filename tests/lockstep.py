@@ -365,6 +365,7 @@ class Lockstep:
         state = copied(party.context.getState(**EVERYTHING))
         integrator = PSEBrownianIntegrator.cast(copied(party.integrator))
         if (self.scene.temperature > 0) != (self.settings["Temperature"] > 0):
+            party.integrator.applyMobility(np.zeros((self.scene.count, 3))) # in a box that was set since the last step
             integrator.setNumericalParameters(party.plan()) # it was made for another temperature
         made = Party(self.platformName, copied(party.context.getSystem()), integrator)
         made.context.setState(state)

@@ -46,6 +46,9 @@ KEPT_ON_HOSTS = {
     "a box set after a checkpoint of a Context without steps": RandomScene(
         seed=16112, count=33, phi=0.006342, edges=(1.418, 0.8162), places="chain", massless=7, tolerance=1.315e-06,
         size=1.149e-05, repulsion=True, calls=(("stress",), ("checkpoint", 1), ("box", 0.984, 0.128))),
+    "a box set before a copy of what was made for another temperature": RandomScene(
+        phi=0.02941, edges=(0.5449, 1.376), kinds=2, ratio=5.627, temperature=0.0, tolerance=0.001752, size=0.7536,
+        calls=(("reinitialize", False), ("temperature", 2.0), ("samples", 1), ("box", 0.96, 0.042), ("xml",))),
 }
 
 ONE_PLACE = dict(seed=5, count=20, places="one place", pull=2.0, calls=(("samples", 1), ("checkpoint", 1)))
