@@ -2,6 +2,7 @@
 #include "numerics/WaveFactors.h"
 #include "numerics/Window.h"
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 namespace PSE::numerics {
@@ -46,44 +47,30 @@ namespace {
 /// of the tables' error: an error e of w makes one of about 2 e in M [T36]
 constexpr double SHARE = 0.1;
 constexpr double SMALLEST_ERROR = 1e-13;
-constexpr int LOWEST_DEGREE = 4, HIGHEST_DEGREE = 80;
 
 } // namespace
 
-double WaveWeight::operator()(double k2) const {
-    return k2 < end2 ? std::max(0.0, w(2 * k2 / end2 - 1)) : 0;
-}
-
-WaveWeight fitWaveWeight(const std::function<double(double)>& w, double end, double maxError) {
-    // what lies below half the error at the end is left out
-    double low = 0, high = end;
-    for (int i = 0; i < 60 && w(high) < 0.5 * maxError; i++) {
-        const double middle = 0.5 * (low + high);
-        (w(middle) < 0.5 * maxError ? high : low) = middle;
-    }
-    const auto weight = [&](double t) { return w(high * std::sqrt(std::max(0.0, 0.5 * (1 + t)))); };
-    return {high * high, fitPolynomial(weight, 0.5 * maxError, LOWEST_DEGREE, HIGHEST_DEGREE)};
-}
-
 MovingWaveFactors::MovingWaveFactors(const Plan& plan) : a(plan.a), perVolume(1), timesVolume(0) {
-    const double error = std::max(SMALLEST_ERROR, SHARE * plan.tableError);
+    const WeightErrors errors = {std::max(SMALLEST_ERROR, SHARE * plan.tableError),
+                                 plan.precision == Precision::Single ? FLT_EPSILON : DBL_EPSILON};
     for (int d = 0; d < 3; d++)
         for (int i = 0; i < (d < 2 ? plan.grid[d] : plan.grid[d] / 2 + 1); i++)
             deconvolution[d].push_back(2 * i == plan.grid[d] ? 0 : 1);
     if (plan.mixture) {
         const RadialWindow window(plan.windowSupport, plan.windowShape, plan.windowSpacing);
         const double peak = window.transform(0), points = plan.gridPoints();
-        const auto w = [&](double k) {
+        const auto inverseSquare = [&](double k) {
             const double inverse = peak / window.transform(k);
-            return plan.mixture->envelope(k) * inverse * inverse;
+            return inverse * inverse;
         };
-        weight = fitWaveWeight(w, window.band(), error);
+        weight = fitWaveWeight([&](double k) { return plan.mixture->envelope(k); }, inverseSquare,
+                               std::min(window.band(), plan.mixture->largestWaveNumber()), errors);
         timesVolume = 1 / (peak * peak * points * points);
         perVolume = 0;
         return;
     }
-    const auto w = [&](double k) { return plan.split->waveWeight(k); };
-    weight = fitWaveWeight(w, plan.split->largestWaveNumber(), error);
+    weight = fitWaveWeight([&](double k) { return plan.split->waveWeight(k); },
+                           [](double) { return 1.0; }, plan.split->largestWaveNumber(), errors);
     const Window window(plan.windowSupport, plan.windowShape);
     for (int d = 0; d < 3; d++)
         for (size_t i = 0; i < deconvolution[d].size(); i++) {

@@ -2,12 +2,12 @@
 #ifndef OPENMMPSE_NUMERICS_WAVEFACTORS_H_
 #define OPENMMPSE_NUMERICS_WAVEFACTORS_H_
 
-#include "numerics/Chebyshev.h"
 #include "numerics/Plan.h"
 #include "numerics/RadialWindow.h"
 #include "numerics/Vec3.h"
+#include "numerics/WaveWeight.h"
 #include <array>
-#include <functional>
+#include <memory>
 #include <vector>
 
 namespace PSE::numerics {
@@ -42,24 +42,6 @@ private:
     std::vector<RadialWindow> radial; ///< that of a mixture, else none
     double cell = 0;                  ///< volume per grid point
 };
-
-/**
- * The wave weight as one polynomial: for boxes that move, whose factors are made anew in every step
- * [T36].
- */
-struct WaveWeight {
-    double end2;  ///< k^2 beyond which the weight counts as 0, in 1/a^2
-    Polynomial w; ///< w(k) in t = 2 k^2/end2 - 1
-
-    /** w(k), never negative. @param k2  k^2 in 1/a^2, >= 0 */
-    double operator()(double k2) const;
-};
-
-/**
- * @param maxError  absolute error allowed of w
- * @param end       in 1/a; w falls towards it, and is negligible beyond
- */
-WaveWeight fitWaveWeight(const std::function<double(double)>& w, double end, double maxError);
 
 /**
  * WaveFactors of a box that moves, in parts:

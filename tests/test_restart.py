@@ -12,7 +12,7 @@ import pytest
 
 from openmmpse import PSEBrownianIntegrator
 import scenes
-from platformnames import contextOn, served
+from platformnames import contextOn, isDirect, served
 from scenes import makeContext, positionsOf, randomForces
 
 T, DT = 300.0, 4.0
@@ -334,3 +334,34 @@ def testReinitializeStartsAfresh(platformName):
     assert step @ again < 0.7*np.linalg.norm(step)*np.linalg.norm(again)
     other, uninterrupted = makeContext(s, platformName, T, DT, seed=35)
     assert np.allclose(run(other, uninterrupted, 6)[-1], more[-1], rtol=0, atol=1e-3)
+
+
+@pytest.mark.onePrecision
+@pytest.mark.parametrize("way", ["checkpoint", "state", "reinitialize"])
+def testAHeatedRunContinues(platformName, way):
+    """A Context keeps the Plan it was made with at 0 K when it is heated, and so does what goes on from there."""
+    # a scene where noise, which makes pairs dear, moves the split
+    s = scenes.randomSuspension(60, 0.1, scenes.tilted(1), 0.5, 402)
+
+    def configure(i):
+        if isDirect(platformName):
+            i.setSplit(PSEBrownianIntegrator.Hasimoto)
+    context, integrator = bondedContext(platformName, s, T=0.0, configure=configure)
+    cold = integrator.getNumericalParameters()
+    other, fresh = bondedContext(platformName, s, configure=configure)
+    assert fresh.getNumericalParameters()["xi"] != cold["xi"]
+    integrator.setTemperature(T)
+    run(context, integrator, 4)
+    state = stateThroughXml(context)
+    checkpoint = context.createCheckpoint()
+    expected = run(context, integrator, 5)
+    if way == "checkpoint":
+        other.loadCheckpoint(checkpoint)
+    elif way == "state":
+        other.setState(state)
+    else:
+        context.loadCheckpoint(checkpoint)
+        context.reinitialize(preserveState=True)
+        other, fresh = context, integrator
+    assert fresh.getNumericalParameters()["xi"] == cold["xi"]
+    assert np.array_equal(run(other, fresh, 5), expected)

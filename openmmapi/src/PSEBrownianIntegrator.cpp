@@ -386,6 +386,7 @@ void PSEBrownianIntegrator::serializeParameters(SerializationNode& node) const {
     writeBox(planned, state.plannedBox);
     planned.setBoolProperty("moves", state.plannedToMove);
     planned.setDoubleProperty("shortest", state.plannedShortest);
+    planned.setBoolProperty("thermal", state.plannedThermal);
     writeBox(node.createChildNode("LastBox"), state.lastBox);
 }
 
@@ -408,6 +409,7 @@ void PSEBrownianIntegrator::deserializeParameters(const SerializationNode& node)
             readBox(child, state.plannedBox);
             state.plannedToMove = child.getBoolProperty("moves");
             state.plannedShortest = child.getDoubleProperty("shortest");
+            state.plannedThermal = child.getBoolProperty("thermal");
         } else if (child.getName() == "LastBox")
             readBox(child, state.lastBox);
     kernel.getAs<IntegratePSEStepKernel>().setStepState(state);

@@ -23,7 +23,7 @@ namespace PSE {
 
 namespace {
 
-constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 3";
+constexpr char CHECKPOINT_MAGIC[] = "openmmpse checkpoint 4";
 /// Boxes from the origin: there a position is known to 1e-7 of the box.
 constexpr double FARTHEST = 1e9;
 /// Radii that rounding of a coordinate may be, in an unbounded fluid: 1e-7 at 1e9 radii from the
@@ -490,6 +490,7 @@ StepState PlannedStepKernel::getStepState() const {
     }
     state.plannedToMove = planned.moving;
     state.plannedShortest = planned.shortest;
+    state.plannedThermal = planned.thermal;
     return state;
 }
 
@@ -508,6 +509,7 @@ PlanRequest PlannedStepKernel::requestOf(const StepState& state) const {
     PlanRequest planned = *request;
     planned.moving = state.plannedToMove;
     planned.shortest = state.plannedShortest;
+    planned.thermal = state.plannedThermal;
     try {
         planned.box = latticeOf(state.plannedBox);
         if (state.lastBox[0][0] != 0)
@@ -524,7 +526,8 @@ void PlannedStepKernel::setStepState(const StepState& state) {
         const Lattice box = currentBox();
         const Lattice needed = isSheared() ? box.mostSheared() : box;
         const bool same = planned.box == request->box && planned.moving == request->moving &&
-                          planned.shortest == request->shortest;
+                          planned.shortest == request->shortest &&
+                          planned.thermal == request->thermal;
         if (!same && serves(planned, needed))
             use(prepared(planned), box);
         if (state.lastBox[0][0] != 0)
@@ -550,6 +553,7 @@ void PlannedStepKernel::createCheckpoint(std::ostream& stream) const {
         write(stream, edge);
     write(stream, state.plannedToMove);
     write(stream, state.plannedShortest);
+    write(stream, state.plannedThermal);
     for (const OmmVec3& edge : state.lastBox)
         write(stream, edge);
 }
@@ -572,6 +576,7 @@ void PlannedStepKernel::loadCheckpoint(std::istream& stream) {
         edge = read<OmmVec3>(stream);
     state.plannedToMove = read<bool>(stream);
     state.plannedShortest = read<double>(stream);
+    state.plannedThermal = read<bool>(stream);
     for (OmmVec3& edge : state.lastBox)
         edge = read<OmmVec3>(stream);
     // Only what the checkpoint was planned for makes a Plan that may be compared with its own.

@@ -104,8 +104,7 @@ void DeviceWaveSpace::prepareFactors(const Plan& plan, const Lattice& box) {
 
 void DeviceWaveSpace::prepareMovingFactors(const Plan& plan) {
     moving.reset(new MovingWaveFactors(plan));
-    const std::vector<double>& powers = moving->weight.w.powers;
-    uploadReals(weightPowers, context, {powers.rbegin(), powers.rend()}, "pseWeightPowers");
+    uploadReals(weightPowers, context, moving->weight.powers, "pseWeightPowers");
     std::vector<double> all;
     for (const std::vector<double>& axis : moving->deconvolution)
         all.insert(all.end(), axis.begin(), axis.end());
@@ -125,7 +124,8 @@ void DeviceWaveSpace::followBox(DeviceClock& clock) {
     if (!factorsStale)
         return;
     makeFactors(static_cast<int>(numModes(size)), size, Real{scale}, Real{moving->weight.end2},
-                moving->weight.w.degree(), weightPowers, deconvolution, waves.array(), factors);
+                moving->weight.pieces, moving->weight.degree, weightPowers, deconvolution,
+                waves.array(), factors);
     factorsStale = false;
     clock.charge(MOVING_BOX);
 }

@@ -99,8 +99,8 @@ template <class Real> void CpuWaveSpace<Real>::prepareFactors(const WaveFactors&
 
 template <class Real> void CpuWaveSpace<Real>::prepareMovingFactors(const Plan& plan) {
     moving.reset(new MovingWaveFactors(plan));
-    const std::vector<double>& powers = moving->weight.w.powers;
-    weightCoefficients.assign(powers.rbegin(), powers.rend());
+    const std::vector<double>& powers = moving->weight.powers;
+    weightCoefficients.assign(powers.begin(), powers.end());
     for (int d = 0; d < 3; d++) {
         const std::vector<double>& exact = moving->deconvolution[d];
         deconvolution[d].assign(d < 2 ? size[d] : chunks * WAVE_LANES, Real(0));
@@ -119,7 +119,8 @@ template <class Real> FactorColumns<Real> CpuWaveSpace<Real>::factorColumns() co
         columns.waveVectors[i] = Real(waves(i / 3, i % 3));
     columns.inverseX = deconvolution[0].data();
     columns.last2 = Real(moving->weight.end2);
-    columns.degree = int(weightCoefficients.size()) - 1;
+    columns.pieces = moving->weight.pieces;
+    columns.degree = moving->weight.degree;
     columns.coefficients = weightCoefficients.data();
     return columns;
 }

@@ -176,12 +176,33 @@ template <class Real> HWY_INLINE bool anyKept(const Real* factors) {
     return !hn::AllTrue(d, hn::Eq(largest, hn::Zero(d)));
 }
 
+/** w(k^2) of numerics::WaveWeight; arbitrary from last2 on. @param V  a vector of numbers of D */
+template <class D, class V, class Real>
+HWY_INLINE V weightOf(D d, const FactorColumns<Real>& columns, V k2) {
+    const auto one = hn::Set(d, Real(1));
+    const V place = hn::Mul(k2, hn::Set(d, columns.pieces / columns.last2));
+    if (columns.pieces == 1) {
+        const V t = hn::Sub(hn::Add(place, place), one);
+        V w = hn::Set(d, columns.coefficients[0]);
+        for (int power = 1; power <= columns.degree; power++)
+            w = hn::MulAdd(w, t, hn::Set(d, columns.coefficients[power]));
+        return w;
+    }
+    const V floor = hn::Floor(hn::Min(place, hn::Set(d, Real(columns.pieces - 1))));
+    const V beyond = hn::Sub(place, floor), t = hn::Sub(hn::Add(beyond, beyond), one);
+    const auto piece = hn::ConvertTo(hn::RebindToSigned<D>(), floor);
+    V w = hn::GatherIndex(d, columns.coefficients, piece);
+    for (int power = 1; power <= columns.degree; power++)
+        w = hn::MulAdd(
+            w, t, hn::GatherIndex(d, columns.coefficients + size_t(power) * columns.pieces, piece));
+    return w;
+}
+
 template <class Real>
 bool fillFactorsAny(const FactorColumns<Real>& columns, Real* HWY_RESTRICT factors) {
     const hn::CappedTag<Real, LANES> d;
     const Real* b = columns.waveVectors;
-    const auto zero = hn::Zero(d), one = hn::Set(d, Real(1)), last2 = hn::Set(d, columns.last2),
-               scale = hn::Set(d, 2 / columns.last2);
+    const auto zero = hn::Zero(d), last2 = hn::Set(d, columns.last2);
     auto largest = zero;
     for (int x = 0; x < columns.sizeX; x++) {
         const int nx = (2 * x <= columns.sizeX ? x : x - columns.sizeX);
@@ -194,10 +215,7 @@ bool fillFactorsAny(const FactorColumns<Real>& columns, Real* HWY_RESTRICT facto
                                           hn::Set(d, b[3 * c] * nx + b[3 * c + 1] * columns.ny));
                 k2 = hn::MulAdd(k, k, k2);
             }
-            const auto t = hn::MulSub(scale, k2, one);
-            auto w = hn::Set(d, columns.coefficients[0]);
-            for (int power = 1; power <= columns.degree; power++)
-                w = hn::MulAdd(w, t, hn::Set(d, columns.coefficients[power]));
+            const auto w = weightOf(d, columns, k2);
             const auto kept = hn::And(hn::Gt(k2, zero), hn::Lt(k2, last2));
             const auto D = hn::IfThenElseZero(
                 kept, hn::Div(hn::Mul(hn::Mul(along, hn::LoadU(d, columns.inverseZ + i)),

@@ -34,8 +34,8 @@ template <class Real> struct FactorColumns {
     Real inverseY;            ///< the same, times what all factors have in common
     const Real* inverseZ;     ///< [WAVE_LANES], from firstZ on
     Real last2;               ///< k^2 beyond which w is 0
-    int degree;               ///< of w in t = 2 k^2/last2 - 1
-    const Real* coefficients; ///< [degree + 1], highest power first
+    int pieces, degree;       ///< of w, as in numerics::WaveWeight
+    const Real* coefficients; ///< [degree + 1][pieces], highest power first
 };
 
 template <class Real> struct WaveKernels {

@@ -32,6 +32,10 @@ KEPT = {
         seed=50334, count=51, model="FreeDraining", phi=0.001324, tilts=(1.0, 1.0, -1.0), places="droplet",
         temperature=0.0, size=4.467e-05, repulsion=True, strain=0.241,
         calls=(("step", 1), ("checkpoint", 1), ("places", 6))),
+    "waves of unequal spheres in a box that moves, up to the end of the window": RandomScene(
+        seed=14445, count=35, split="Hasimoto", phi=0.05225, edges=(2.072, 3.514), tilts=(0.0, 0.31, -1.0), kinds=5,
+        ratio=5.423, massless=15, radius=2.802, viscosity=1.161, tolerance=4.237e-05, bonds=True, repulsion=True,
+        wrapped=False, strain=-0.336, protocol="StartUpShear", calls=(("samples", 2),)),
 }
 # The same, of what is decided on hosts.
 KEPT_ON_HOSTS = {

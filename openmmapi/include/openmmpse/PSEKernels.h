@@ -15,11 +15,12 @@ namespace PSE {
 struct StepState {
     unsigned long long step = 0, sample = 0; ///< thermal steps taken, samples drawn
     double strain = 0;                       ///< of all sheared steps so far
-    /// What the Plan was made for: a box (zero vectors: no Plan), whether it moves, and how much
-    /// shorter it may become, as a factor
+    /// What the Plan was made for: a box (zero vectors: no Plan), whether it moves, how much shorter
+    /// it may become, as a factor, and whether there was noise
     OpenMM::Vec3 plannedBox[3];
     bool plannedToMove = false;
     double plannedShortest = 1;
+    bool plannedThermal = true;
     /// The box of the last step: whether the next one is a small change of it counts from there
     OpenMM::Vec3 lastBox[3];
 };

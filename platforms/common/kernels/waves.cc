@@ -51,10 +51,10 @@ DEVICE int waveNumber(int i, int count) {
 /**
  * D of a box that moves [T36]: scale w(k^2)/k^2 times what belongs to each axis.
  * @param end2           k^2 from which on w = 0
- * @param powers         of w in t = 2 k^2/end2 - 1, highest first
+ * @param powers         [degree+1][pieces] of w in t = 2 (k^2 pieces/end2 - piece) - 1, highest first
  * @param deconvolution  of x, then of y, then of z up to half of the grid
  */
-KERNEL void makeFactors(int4 size, real scale, real end2, int degree, GLOBAL const real* RESTRICT powers,
+KERNEL void makeFactors(int4 size, real scale, real end2, int pieces, int degree, GLOBAL const real* RESTRICT powers,
         GLOBAL const real* RESTRICT deconvolution, GLOBAL const real* RESTRICT waves, GLOBAL real* RESTRICT factors) {
     const int sizeZ = size.z/2+1, modes = size.x*size.y*sizeZ;
     for (int i = GLOBAL_ID; i < modes; i += GLOBAL_SIZE) {
@@ -65,10 +65,12 @@ KERNEL void makeFactors(int4 size, real scale, real end2, int degree, GLOBAL con
         const real k2 = kx*kx+ky*ky+kz*kz;
         real D = 0;
         if (k2 > 0 && k2 < end2) {
-            const real t = 2*k2/end2-1;
-            real w = powers[0];
+            const real place = k2*pieces/end2;
+            const int piece = place < pieces ? (int) place : pieces-1;
+            const real t = 2*(place-piece)-1;
+            real w = powers[piece];
             for (int power = 1; power <= degree; power++)
-                w = w*t+powers[power];
+                w = w*t+powers[power*pieces+piece];
             if (w > 0)
                 D = scale*w/k2*deconvolution[x]*deconvolution[size.x+y]*deconvolution[size.x+size.y+nz];
         }
