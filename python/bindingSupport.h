@@ -12,6 +12,7 @@
 #include "openmm/System.h"
 #include "openmm/Vec3.h"
 #include "openmm/internal/ContextImpl.h"
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <map>
@@ -87,6 +88,12 @@ struct ContextAccess : OpenMM::Integrator {
 inline int particleCount(const OpenMM::Integrator& integrator) {
     OpenMM::ContextImpl* context = ContextAccess::of(integrator);
     return context ? context->getSystem().getNumParticles() : -1;
+}
+
+/** Where the Context of an integrator is in memory; 0 if it has none. */
+inline unsigned long long contextAddress(const OpenMM::Integrator& integrator) {
+    OpenMM::ContextImpl* context = ContextAccess::of(integrator);
+    return context ? reinterpret_cast<uintptr_t>(&context->getOwner()) : 0;
 }
 
 /** New reference to the dict that Python sees for NumericalParameters. */

@@ -341,28 +341,7 @@ openmm.OpenMMException
     if the integrator has no Context yet, or a position is not finite
 %}
 %feature("docstring") PSE::PSEBrownianIntegrator::sampleBrownianDisplacements %{
-Draw independent samples of sqrt(2 kT dt M) dW at the current positions.
-
-Their covariance is 2 kT dt M to the tolerance of setErrorTolerance(). They come from a stream of
-random numbers of their own: repeated calls differ, and the trajectory is left as it is.
-Source: Fiore et al., J. Chem. Phys. 146, 124116 (2017).
-
-Parameters
-----------
-count : int
-    number of samples, >= 0
-
-Returns
--------
-numpy.ndarray of shape (count, N, 3), float64
-    displacement of each particle in each sample (in nm); all zero at temperature 0
-
-Raises
-------
-TypeError
-    if count is not an integer
-openmm.OpenMMException
-    if count is negative, the integrator has no Context yet, or a position is not finite
+Draw samples in one call, which cannot be interrupted.
 %}
 %feature("docstring") PSE::PSEBrownianIntegrator::computeStress %{
 Compute the stress that the particles add to that of the solvent, at the current positions.

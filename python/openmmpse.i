@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The Python face of PSEBrownianIntegrator: the C++ header as it is, with units checked on the way
 // in, Quantities on the way out, NumPy arrays for vectors and dicts for numerical parameters.
-// step() is not wrapped here: the one inherited from openmm.Integrator dispatches virtually and
-// releases the GIL.
+// step() calls the one inherited from openmm.Integrator, which dispatches virtually and releases the
+// GIL.
 %module(package="openmmpse") binding
 
 %include "factory.i"
@@ -28,6 +28,7 @@ from openmm import unit
 from openmmpse.conversion import (
     STRESS_UNIT, VISCOSITY_UNIT, arrayOfForces, forceGroups, inUnit, integer,
     numericalParameterArguments)
+from openmmpse.interruption import inBlocks, keptContext, refusedWithText
 %}
 
 // ---- exceptions of C++ become openmm.OpenMMException ----
@@ -114,8 +115,6 @@ PSE_NUMBER(setSplit, split, integer(split, "split"))
 PSE_NUMBER(setWindowSupport, support, integer(support, "support"))
 PSE_NUMBER(setRandomNumberSeed, seed, integer(seed, "seed"))
 PSE_NUMBER(setNumericalParameters, parameters, numericalParameterArguments(parameters))
-PSE_NUMBER(applyMobility, forces, arrayOfForces(forces, self._particleCount()))
-PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 
 %feature("pythonprepend") PSE::PSEBrownianIntegrator::PSEBrownianIntegrator %{
     temperature = inUnit(temperature, unit.kelvin, "temperature")
@@ -149,15 +148,19 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 %feature("pythonappend") PSE::PSEBrownianIntegrator::getGridDimensions %{
     val = tuple(val)
 %}
+%feature("pythonprepend") PSE::PSEBrownianIntegrator::applyMobility %{
+    forces, kept = arrayOfForces(forces, self._particleCount()), keptContext(self)
+%}
 %feature("pythonappend") PSE::PSEBrownianIntegrator::applyMobility %{
     val = numpy.frombuffer(val).reshape(-1, 3)
 %}
+%rename(_drawn) PSE::PSEBrownianIntegrator::sampleBrownianDisplacements;
 %feature("pythonappend") PSE::PSEBrownianIntegrator::sampleBrownianDisplacements %{
     val = numpy.frombuffer(val).reshape(count, self._particleCount(), 3)
 %}
 
 %feature("pythonprepend") PSE::PSEBrownianIntegrator::computeStress %{
-    parts, groups = integer(parts, "parts"), forceGroups(groups)
+    parts, groups, kept = integer(parts, "parts"), forceGroups(groups), keptContext(self)
 %}
 %feature("pythonappend") PSE::PSEBrownianIntegrator::computeStress %{
     val = unit.Quantity(numpy.frombuffer(val).reshape(3, 3), STRESS_UNIT)
@@ -176,6 +179,7 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
 
 %extend PSE::PSEBrownianIntegrator {
     int _particleCount() { return particleCount(*$self); }
+    unsigned long long _contextAddress() { return contextAddress(*$self); }
     static bool isinstance(OpenMM::Integrator& integrator) {
         return dynamic_cast<PSE::PSEBrownianIntegrator*>(&integrator) != nullptr;
     }
@@ -187,6 +191,78 @@ PSE_NUMBER(sampleBrownianDisplacements, count, integer(count, "count"))
         return *derived;
     }
 %pythoncode %{
+    def step(self, steps):
+        """Advance the simulation by a number of steps.
+
+        Ctrl-C ends it at a whole step, within 0.2 s or the time of one step if that is longer: what
+        was done so far is kept, and KeyboardInterrupt is raised, or the script's own handler of
+        SIGINT called. The Context lives until the call ends, even if nothing else refers to it any
+        more. One thread at a time may use an integrator.
+        Source: Fiore et al., J. Chem. Phys. 146, 124116 (2017).
+
+        Parameters
+        ----------
+        steps : int
+            number of steps, each getStepSize() long; none is made if it is not positive
+
+        Raises
+        ------
+        TypeError
+            if steps is not an integer
+        openmm.OpenMMException
+            naming the first position or force that is not finite, or a particle that a step which
+            is too long for its force would carry away; that step is not made. Also if the
+            integrator has no Context yet, another call on it is under way, a Force fails, or the
+            last checkpoint was refused
+        """
+        steps, kept = integer(steps, "steps"), keptContext(self)
+        with refusedWithText():
+            inBlocks(super().step, steps)
+
+    def sampleBrownianDisplacements(self, count):
+        """Draw independent samples of sqrt(2 kT dt M) dW at the current positions.
+
+        Their covariance is 2 kT dt M to the tolerance of setErrorTolerance(). They come from a
+        stream of random numbers of their own: repeated calls differ, and the trajectory is left as
+        it is. Ctrl-C ends it after a whole sample, and the samples so far are lost.
+        Source: Fiore et al., J. Chem. Phys. 146, 124116 (2017).
+
+        Parameters
+        ----------
+        count : int
+            number of samples, >= 0
+
+        Returns
+        -------
+        numpy.ndarray of shape (count, N, 3), float64
+            displacement of each particle in each sample (in nm); all zero at temperature 0
+
+        Raises
+        ------
+        TypeError
+            if count is not an integer
+        MemoryError
+            if there is no room for that many
+        openmm.OpenMMException
+            if count is negative, the integrator has no Context or no positions yet, a position is
+            not finite, another call is under way, or the last checkpoint was refused
+        """
+        count, kept = integer(count, "count"), keptContext(self)
+        if count <= 1:
+            return self._drawn(count)
+        first = self._drawn(1)
+        samples = numpy.empty((count, *first.shape[1:]))
+        samples[0] = first
+        done = 1
+
+        def draw(more):
+            nonlocal done
+            samples[done:done + more] = self._drawn(more)
+            done += more
+
+        inBlocks(draw, count - 1)
+        return samples
+
     @staticmethod
     def cast(integrator):
         """Get an openmm.Integrator that is a PSEBrownianIntegrator in C++ as one in Python.

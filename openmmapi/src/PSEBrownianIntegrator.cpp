@@ -62,6 +62,25 @@ unsigned long long counter(const string& text) {
     return std::stoull(text);
 }
 
+/** While it lives, nobody else may use the Context: no other thread, and no Force that is computed.
+ */
+class Exclusive {
+public:
+    Exclusive(std::atomic<bool>& inUse, const char* method) : inUse(inUse) {
+        if (inUse.exchange(true))
+            refuse(string(method) +
+                   " was called while another call on the same integrator is under way, in another "
+                   "thread or in one that computes a Force; wait for its end, or give each thread "
+                   "an integrator and a Context of its own");
+    }
+    ~Exclusive() { inUse = false; }
+    Exclusive(const Exclusive&) = delete;
+    Exclusive& operator=(const Exclusive&) = delete;
+
+private:
+    std::atomic<bool>& inUse;
+};
+
 } // namespace
 
 PSEBrownianIntegrator::PSEBrownianIntegrator(double temperature, double viscosity, double radius,
@@ -91,6 +110,16 @@ void PSEBrownianIntegrator::requirePositions(const char* method) const {
     if (!positionsSet)
         refuse(string(method) +
                " needs positions, and none have been set; call Context.setPositions first");
+    requireWhole(method);
+}
+
+void PSEBrownianIntegrator::requireWhole(const char* method) const {
+    if (halfLoaded)
+        refuse(
+            string(method) +
+            ": the last checkpoint was refused after OpenMM had taken positions, velocities, box "
+            "and time from it, which do not go with the noise of this integrator; load another "
+            "checkpoint or a State, or set box and positions");
 }
 
 void PSEBrownianIntegrator::setTemperature(double value) {
@@ -266,6 +295,7 @@ void PSEBrownianIntegrator::initialize(ContextImpl& contextRef) {
     kernel = created;
     scene = seen;
     positionsSet = false;
+    halfLoaded = false;
     context = &contextRef;
     owner = &contextRef.getOwner();
 }
@@ -274,6 +304,7 @@ void PSEBrownianIntegrator::stateChanged(State::DataType changed) {
     if (changed != State::Positions)
         return;
     positionsSet = true;
+    halfLoaded = false;
     if (context != NULL)
         kernel.getAs<IntegratePSEStepKernel>().positionsSet();
 }
@@ -296,6 +327,8 @@ double PSEBrownianIntegrator::computeKineticEnergy() {
 
 void PSEBrownianIntegrator::step(int steps) {
     requireBound("step");
+    requireWhole("step");
+    const Exclusive use(inUse, "step");
     for (int i = 0; i < steps; i++) {
         if (context->updateContextState())
             kernel.getAs<IntegratePSEStepKernel>().positionsChanged();
@@ -313,6 +346,7 @@ vector<Vec3> PSEBrownianIntegrator::applyMobility(const vector<Vec3>& forces) {
                 << context->getSystem().getNumParticles() << " particles";
         refuse(message.str());
     }
+    const Exclusive use(inUse, "applyMobility");
     kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
     return kernel.getAs<IntegratePSEStepKernel>().applyMobility(*context, forces);
 }
@@ -325,6 +359,7 @@ vector<Vec3> PSEBrownianIntegrator::sampleBrownianDisplacements(int count) {
                 << " samples; the count cannot be negative";
         refuse(message.str());
     }
+    const Exclusive use(inUse, "sampleBrownianDisplacements");
     kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
     return kernel.getAs<IntegratePSEStepKernel>().sampleBrownianDisplacements(*context, *this,
                                                                               count);
@@ -337,6 +372,7 @@ vector<Vec3> PSEBrownianIntegrator::computeStress(int parts, int groups) {
         refuse("computeStress: nothing here is periodic, so there is no volume to refer a stress "
                "to; call setFluidBoundary(Periodic) before the Context is created, or sum "
                "positions times forces of getState() yourself");
+    const Exclusive use(inUse, "computeStress");
     kernel.getAs<IntegratePSEStepKernel>().checkPositions(*context);
     return kernel.getAs<IntegratePSEStepKernel>().computeStress(
         *context, *this, parts, groups & getIntegrationForceGroups());
@@ -371,7 +407,9 @@ void PSEBrownianIntegrator::createCheckpoint(std::ostream& stream) const {
 void PSEBrownianIntegrator::loadCheckpoint(std::istream& stream) {
     // Positions are the checkpoint's by now, even if the rest of it is refused.
     kernel.getAs<IntegratePSEStepKernel>().positionsSet();
+    halfLoaded = true;
     kernel.getAs<IntegratePSEStepKernel>().loadCheckpoint(stream);
+    halfLoaded = false;
 }
 
 void PSEBrownianIntegrator::serializeParameters(SerializationNode& node) const {

@@ -6,6 +6,8 @@ import os
 import re
 import signal
 import threading
+import time
+import weakref
 
 import numpy as np
 import openmm
@@ -168,7 +170,8 @@ def testACheckpointCutOffOrForeign(platformName, hardCase):
     Checkpoints cut off at any of 40 places behind the header of OpenMM (which reads on where its
     header ends too early), and one of openmm.BrownianIntegrator.
 
-    All are refused; the good one still loads and continues to the bit.
+    All are refused. OpenMM has taken positions, box and time from the checkpoint by then, so steps are
+    refused, too, until there are others; a good checkpoint still loads and continues to the bit.
     """
     context, integrator = run(platformName)
     checkpoint = context.createCheckpoint()
@@ -178,6 +181,13 @@ def testACheckpointCutOffOrForeign(platformName, hardCase):
     other, fresh = run(platformName, seed=6)
     for cut in rng.integers(1, len(checkpoint) - HEADER, 40):
         refusalOf(other.loadCheckpoint, checkpoint[:-int(cut)])
+        for call, arguments in ((fresh.step, (1,)), (fresh.applyMobility, (np.ones((12, 3)),)),
+                                (fresh.sampleBrownianDisplacements, (1,)), (fresh.computeStress, ())):
+            assert "last checkpoint was refused" in refusalOf(call, *arguments)
+    other.setPeriodicBoxVectors(*suspension().box)
+    other.setPositions(suspension().positions)
+    fresh.step(1)
+    assert np.all(np.isfinite(positionsOf(other)))
     theirs = openmm.BrownianIntegrator(TEMPERATURE, 50.0, 0.5)
     foreign = scenes.contextOn(platformName, scenes.makeSystem(suspension()), theirs, 1)
     foreign.setPositions(suspension().positions)
@@ -229,26 +239,41 @@ def interruptible():
     signal.signal(signal.SIGINT, previous)
 
 
+def interruptedAfter(seconds, call, *arguments):
+    """What SIGINT makes of a call, and how long after it the call went on."""
+    sent = []
+
+    def interrupt():
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(seconds, interrupt)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            call(*arguments)
+    finally:
+        timer.cancel()
+    return time.perf_counter() - sent[0]
+
+
 def testKeyboardInterrupt(platformName, interruptible, hardCase):
     """
-    SIGINT during a long call of step(), five times.
+    SIGINT during one call of step() for a hundred million steps, five times, and during one of
+    sampleBrownianDisplacements().
 
     KeyboardInterrupt at a whole step, positions finite; a checkpoint from then continues to the bit.
     """
     context, integrator = run(platformName)
     counts = []
     for _ in range(5):
-        timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
-        timer.start()
-        try:
-            with pytest.raises(KeyboardInterrupt):
-                for _ in range(10**6):
-                    integrator.step(10)
-        finally:
-            timer.cancel()
+        interruptedAfter(0.1, integrator.step, 10**8)
         counts.append(context.getStepCount())
         assert np.all(np.isfinite(positionsOf(context)))
-    assert counts == sorted(counts)
+    assert counts == sorted(set(counts))
+    before = stateOf(context)
+    interruptedAfter(0.1, integrator.sampleBrownianDisplacements, 2 * 10**6)
+    assertUntouched(context, before)
     checkpoint = context.createCheckpoint()
     integrator.step(3)
     other, fresh = run(platformName)
@@ -256,6 +281,30 @@ def testKeyboardInterrupt(platformName, interruptible, hardCase):
     fresh.step(3)
     assert np.array_equal(positionsOf(other), positionsOf(context))
     hardCase.measure(steps=counts[-1])
+
+
+@pytest.mark.parametrize("signals", [1, 2])
+def testKeyboardInterruptInsideAForce(platformName, interruptible, hardCase, signals):
+    """
+    SIGINT, once and twice, while the function of a PythonForce runs.
+
+    KeyboardInterrupt, as without such a Force: at the end of the step, or, if it came twice, at once,
+    and then that step is not made; the run goes on.
+    """
+    def action(forces):
+        for _ in range(signals):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01) # here Python looks at signals
+        return 0.0, forces
+
+    context, integrator = run(platformName, 4, [failingForce(action, 6)])
+    with pytest.raises(KeyboardInterrupt):
+        integrator.step(10**6)
+    assert context.getStepCount() >= 5 if signals == 1 else context.getStepCount() == 5
+    before = context.getStepCount()
+    integrator.step(3)
+    assert context.getStepCount() == before + 3 and np.all(np.isfinite(positionsOf(context)))
+    hardCase.measure(steps=before)
 
 
 def testTwoContextsInTwoThreads(platformName, hardCase):
@@ -283,27 +332,70 @@ def testTwoContextsInTwoThreads(platformName, hardCase):
 
 def testContextDroppedDuringARun(platformName, hardCase):
     """
-    The only other reference to a Context dropped while a thread steps its integrator, 10 times.
+    The last reference to a Context dropped in the midst of a step that another thread makes, five times.
 
-    The process lives; the steps end or are refused.
+    The Context lives until that call of step() ends, with all its steps, and is deleted then; another
+    call is refused.
     """
-    ended = 0
-    for _ in range(10):
-        context, integrator = run(platformName, 1)
-        started = threading.Event()
+    for _ in range(5):
+        inside, dropped, deleted = threading.Event(), threading.Event(), threading.Event()
+        messages = []
 
-        def work(integrator=integrator, context=[context]):
-            started.set()
-            integrator.step(50)
+        def action(forces):
+            inside.set()
+            dropped.wait(60)
+            return 0.0, forces
+
+        context, integrator = run(platformName, 1, [failingForce(action, 3)])
+        weakref.finalize(context, deleted.set)
+
+        def work():
+            integrator.step(10)
+            messages.append(refusalOf(integrator.step, 1))
 
         thread = threading.Thread(target=work, daemon=True)
         thread.start()
-        started.wait()
-        del context, work
+        assert inside.wait(60)
+        del context
+        gc.collect()
+        assert not deleted.is_set()
+        dropped.set()
         thread.join(60)
+        assert not thread.is_alive() and deleted.wait(60)
+        assert "needs a Context" in messages[0]
+    hardCase.measure(runs=5)
+
+
+def testTwoThreadsOnOneContext(platformName, hardCase):
+    """
+    Two threads that step one integrator, apply its mobility and draw its samples at the same time.
+
+    Each call is made or refused with a remedy; steps add up to those of the calls that were made.
+    """
+    context, integrator = run(platformName, 1)
+    forces = np.ones((12, 3))
+    made, messages = [0, 0], []
+
+    def work(i):
+        for _ in range(40):
+            try:
+                integrator.step(5)
+                made[i] += 5
+                integrator.applyMobility(forces)
+                integrator.sampleBrownianDisplacements(2)
+            except openmm.OpenMMException as refusal:
+                messages.append(str(refusal))
+
+    threads = [threading.Thread(target=work, args=(i,), daemon=True) for i in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(120)
         assert not thread.is_alive()
-        ended += 1
-    hardCase.measure(runs=ended)
+    assert context.getStepCount() == 1 + sum(made)
+    assert all("under way" in message and "Context of its own" in message for message in messages)
+    assert np.all(np.isfinite(positionsOf(context)))
+    hardCase.measure(refused=len(messages))
 
 
 def child(queue, seed):

@@ -6,6 +6,7 @@
 #include "openmm/Kernel.h"
 #include "openmm/Vec3.h"
 #include "openmmpse/internal/windowsExportPSE.h"
+#include <atomic>
 #include <map>
 #include <memory>
 #include <string>
@@ -244,9 +245,11 @@ public:
     void setRandomNumberSeed(int seed);
 
     /**
-     * Advance the simulation by a number of steps. @throws OpenMMException naming the first
-     * non-finite position or force, or a particle that a step which is too long for its force would
-     * carry away; that step is not made
+     * Advance the simulation by a number of steps. Like the methods below, it may be called by one
+     * thread at a time.
+     * @throws OpenMMException naming the first non-finite position or force, or a particle that a
+     * step which is too long for its force would carry away; that step is not made. Also if another
+     * call is under way, or the last checkpoint was refused.
      */
     void step(int steps) override;
     /**
@@ -314,6 +317,7 @@ private:
     void requireUnbound(const char* setter) const;
     void requireBound(const char* method) const;
     void requirePositions(const char* method) const;
+    void requireWhole(const char* method) const;
 
     double temperature, viscosity, radius;
     double tolerance = 1e-3, shearRate = 0;
@@ -326,6 +330,8 @@ private:
     std::map<int, double> particleRadii;
     NumericalParameters requested;
     bool positionsSet = false;
+    bool halfLoaded = false;            ///< a checkpoint was refused after OpenMM had read its part
+    std::atomic<bool> inUse{false};     ///< a call that uses the Context is under way
     std::shared_ptr<const Scene> scene; ///< as it was when the Context was created
     OpenMM::Kernel kernel;
 };
