@@ -21,19 +21,15 @@ namespace PSE::numerics::inDouble {
 using real = double;
 using mm_ulong = uint64_t;
 #define USE_DOUBLE_PRECISION 1
-#define LOG std::log
 #define SQRT std::sqrt
-#define COS std::cos
-#define SIN std::sin
 #include "numerics/NoiseText.h"
 #undef USE_DOUBLE_PRECISION
-#undef LOG
 #undef SQRT
-#undef COS
-#undef SIN
 } // namespace PSE::numerics::inDouble
 
 #undef DEVICE
 #undef LEADING_ZEROS
+#undef BITS_OF
+#undef FROM_BITS
 
 #endif

@@ -68,11 +68,8 @@ std::string noiseText() {
 const char* const DIALECT = R"(
 #define DEVICE
 typedef ulong mm_ulong;
-#define LOG log
 #define SQRT sqrt
 #define RSQRT rsqrt
-#define COS cos
-#define SIN sin
 )";
 
 const char* const KERNELS = R"(
@@ -164,14 +161,12 @@ private:
     cl_program program;
 };
 
-/** Compares with what NoiseText.h states; a device's double functions may be less exact. */
+/** Compares with what NoiseText.h states. */
 class Comparison {
 public:
-    void add(float computed, long double exact) { errors.add(computed, exact, exact); }
-    void add(double computed, long double exact) { errors.add(computed, exact, 1); }
+    void add(long double computed, long double exact) { errors.add(computed, exact, exact); }
     template <class Real> void expect(const char* what) const {
-        const double limit = sizeof(Real) == 8 ? 2e-14 : noiseOracle::NUMBER_ERROR;
-        EXPECT_LT(errors.largest, limit) << what;
+        EXPECT_LT(errors.largest, noiseOracle::NUMBER_ERROR<Real>) << what;
         EXPECT_GT(errors.count, 0u) << what;
     }
 

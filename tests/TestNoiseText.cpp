@@ -73,10 +73,11 @@ TEST(NoiseText, LogarithmIsExactForWordsOfEverySize) {
                    std::sqrt(2 * exact));
         twice.add(inDouble::minusLogarithm(word), exact, exact);
     }
-    EXPECT_LT(single.largest, noiseOracle::LOGARITHM_ERROR);
+    EXPECT_LT(single.largest, noiseOracle::LOGARITHM_ERROR<float>);
     EXPECT_LT(radius.largest, 1.55e-7);
     EXPECT_LT(radius.rms(), 4e-8);
-    EXPECT_LT(twice.largest, 4e-16);
+    EXPECT_LT(twice.largest, noiseOracle::LOGARITHM_ERROR<double>);
+    EXPECT_LT(twice.rms(), 6e-17);
 }
 
 TEST(NoiseText, CosineAndSineAreExactForWordsOfEverySize) {
@@ -90,12 +91,27 @@ TEST(NoiseText, CosineAndSineAreExactForWordsOfEverySize) {
         inDouble::cosineAndSine(word, &cosine, &sine);
         single.add(c, exact[0], exact[0]);
         single.add(s, exact[1], exact[1]);
-        twice.add(cosine, exact[0], 1);
-        twice.add(sine, exact[1], 1);
+        twice.add(cosine, exact[0], exact[0]);
+        twice.add(sine, exact[1], exact[1]);
     }
-    EXPECT_LT(single.largest, noiseOracle::CIRCLE_ERROR);
+    EXPECT_LT(single.largest, noiseOracle::CIRCLE_ERROR<float>);
     EXPECT_LT(single.rms(), 4e-8);
-    EXPECT_LT(twice.largest, 5e-16);
+    EXPECT_LT(twice.largest, noiseOracle::CIRCLE_ERROR<double>);
+    EXPECT_LT(twice.rms(), 6e-17);
+}
+
+TEST(NoiseText, CosineAndSineOfQuarterTurnsAreWholeNumbers) {
+    const int exact[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+    for (uint32_t quarter = 0; quarter < 4; quarter++) {
+        float c, s;
+        double cosine, sine;
+        inSingle::cosineAndSine(quarter << 30, &c, &s);
+        inDouble::cosineAndSine(quarter << 30, &cosine, &sine);
+        EXPECT_EQ(c, exact[quarter][0]);
+        EXPECT_EQ(s, exact[quarter][1]);
+        EXPECT_EQ(cosine, exact[quarter][0]);
+        EXPECT_EQ(sine, exact[quarter][1]);
+    }
 }
 
 TEST(NoiseText, NormalNumbersKeepTheStatedErrorForAnyInverseRoot) {
@@ -110,13 +126,14 @@ TEST(NoiseText, NormalNumbersKeepTheStatedErrorForAnyInverseRoot) {
         for (int c = 0; c < 2; c++) {
             single.add(x[c], exact[c], exact[c]);
             rough.add(y[c], exact[c], exact[c]);
-            twice.add(z[c], exact[c], 1);
+            twice.add(z[c], exact[c], exact[c]);
         }
     }
-    EXPECT_LT(single.largest, noiseOracle::NUMBER_ERROR);
-    EXPECT_LT(rough.largest, noiseOracle::NUMBER_ERROR);
+    EXPECT_LT(single.largest, noiseOracle::NUMBER_ERROR<float>);
+    EXPECT_LT(rough.largest, noiseOracle::NUMBER_ERROR<float>);
     EXPECT_LT(single.rms(), 6e-8);
-    EXPECT_LT(twice.largest, 4e-15);
+    EXPECT_LT(twice.largest, noiseOracle::NUMBER_ERROR<double>);
+    EXPECT_LT(twice.rms(), 9e-17);
 }
 
 TEST(NoiseText, ExtremeWordsGiveTheSmallestAndTheLargestRadius) {
@@ -130,6 +147,16 @@ TEST(NoiseText, ExtremeWordsGiveTheSmallestAndTheLargestRadius) {
     EXPECT_FLOAT_EQ(y, 1.0f / 65536);
     inSingle::boxMuller(0xffffffffu, 0x80000000u, &x, &y);
     EXPECT_FLOAT_EQ(x, -1.0f / 65536);
+    double u, v;
+    inDouble::boxMuller(0, 0, &u, &v);
+    EXPECT_DOUBLE_EQ(u, std::sqrt(66 * std::log(2.0)));
+    EXPECT_EQ(v, 0);
+    inDouble::boxMuller(0xffffffffu, 0xc0000000u, &u, &v);
+    EXPECT_EQ(u, 0);
+    EXPECT_DOUBLE_EQ(v, -std::sqrt(-2 * std::log1p(-0.5 / 4294967296.0)));
+    // Next to a half, where the exponent changes with the word.
+    for (uint32_t word : {0x7fffffffu, 0x80000000u})
+        EXPECT_DOUBLE_EQ(inDouble::minusLogarithm(word), double(noiseOracle::minusLogarithm(word)));
 }
 
 TEST(NoiseText, ParticlesDrawTheNumbersOfTheDefinition) {
@@ -144,8 +171,8 @@ TEST(NoiseText, ParticlesDrawTheNumbersOfTheDefinition) {
                 inDouble::particleNoise(seed, stream, low, high, particle, twice);
                 const auto exact = noiseOracle::particleNoise(seed, stream, counter, particle);
                 for (int c = 0; c < 3; c++) {
-                    EXPECT_NEAR(single[c] / exact[c], 1, noiseOracle::NUMBER_ERROR);
-                    EXPECT_NEAR(twice[c], double(exact[c]), 4e-15);
+                    EXPECT_NEAR(single[c] / exact[c], 1, noiseOracle::NUMBER_ERROR<float>);
+                    EXPECT_NEAR(twice[c] / exact[c], 1, noiseOracle::NUMBER_ERROR<double>);
                 }
             }
 }
@@ -167,8 +194,8 @@ TEST(NoiseText, ModesDrawTheNumbersOfTheDefinition) {
                 inDouble::modeNoise(9, 1, low, high, n1, n2, n3, twice, twice + 3);
                 const auto exact = noiseOracle::modeNoise(9, 1, counter, n1, n2, n3);
                 for (int c = 0; c < 6; c++) {
-                    ASSERT_NEAR(single[c] / exact[c], 1, noiseOracle::NUMBER_ERROR);
-                    ASSERT_NEAR(twice[c], double(exact[c]), 4e-15);
+                    ASSERT_NEAR(single[c] / exact[c], 1, noiseOracle::NUMBER_ERROR<float>);
+                    ASSERT_NEAR(twice[c] / exact[c], 1, noiseOracle::NUMBER_ERROR<double>);
                     ASSERT_EQ(opposite[c], c < 3 ? single[c] : -single[c]);
                 }
             }
