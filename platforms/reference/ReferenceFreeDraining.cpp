@@ -6,6 +6,10 @@ using namespace PSE::numerics;
 
 namespace PSE {
 
+namespace {
+constexpr int BLOCK = 64; ///< particles whose noise stays in the nearest cache
+}
+
 ReferenceFreeDraining::ReferenceFreeDraining(double viscosity, const std::vector<double>& radii,
                                              const std::vector<int>& indices, StageClock& clock)
     : indices(indices), clock(clock) {
@@ -20,16 +24,17 @@ void ReferenceFreeDraining::computeVelocities(const std::vector<Vec3>* forces,
     clock.start();
     u.resize(mobility.size());
     const double unit = (thermal == NULL ? 0 : std::sqrt(2 * thermal->kT / thermal->dt));
-    static_assert(sizeof(Vec3) == 3 * sizeof(double), "an array of them is one of numbers");
     const int n = static_cast<int>(mobility.size());
-    if (thermal != NULL)
-        particleNoise(thermal->real, indices.data(), n, reinterpret_cast<double(*)[3]>(u.data()));
-    else
-        std::fill(u.begin(), u.end(), Vec3::Zero());
-    for (int i = 0; i < n; i++) {
-        u[i] = unit * root[i] * u[i];
-        if (forces != NULL)
-            u[i] += mobility[i] * (*forces)[i];
+    double z[BLOCK][3] = {};
+    for (int from = 0; from < n; from += BLOCK) {
+        const int count = std::min(BLOCK, n - from);
+        if (thermal != NULL)
+            particleNoise(thermal->real, indices.data() + from, count, z);
+        for (int j = 0, i = from; j < count; j++, i++) {
+            u[i] = unit * root[i] * Vec3(z[j]);
+            if (forces != NULL)
+                u[i] += mobility[i] * (*forces)[i];
+        }
     }
     clock.charge("free draining");
 }
