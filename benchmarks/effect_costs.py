@@ -29,6 +29,7 @@ class Scene:
     model: str = "RotnePragerYamakawa"
     radii: np.ndarray = None  #: of each particle, where they differ
     shearRate: float = 0  #: 1/ps
+    points: int = 0  #: of the grid per axis; 0: automatic
     steps: int = 10
     seconds: list = field(default_factory=list)
 
@@ -41,6 +42,8 @@ class Scene:
         for i, radius in enumerate(self.radii if self.radii is not None else []):
             integrator.setParticleRadius(i, radius)
         integrator.setShearRate(self.shearRate)
+        if self.points:
+            integrator.setGridDimensions(self.points, self.points, self.points)
         return integrator
 
     def start(self, threads):
@@ -77,6 +80,16 @@ def mixed(radii, phi):
     return (4/3*np.pi*np.sum(radii**3)/phi)**(1/3)
 
 
+def randomSpheres(count):
+    """Spheres at random places, phi = 0.2: equal ones, five radii, and all of them different."""
+    rng = np.random.default_rng(5)
+    five, any_ = rng.choice(np.linspace(0.8, 1.6, 5), count), np.exp(rng.uniform(np.log(0.5), np.log(2), count))
+    places = rng.random((count, 3))
+    return [Scene("random spheres, phi = 0.2", *(places*mixed(np.ones(count), 0.2), mixed(np.ones(count), 0.2))),
+            Scene("mixture of five radii, 1:2", places*mixed(five, 0.2), mixed(five, 0.2), radii=five),
+            Scene("every sphere its own radius, 1:4", places*mixed(any_, 0.2), mixed(any_, 0.2), radii=any_)]
+
+
 def groups(count):
     """Scenes, those together that are to be compared."""
     dilute, dense = spheres.suspension(count, 0.01), spheres.suspension(count, 0.3)
@@ -89,12 +102,7 @@ def groups(count):
            Scene("the same, athermal and sheared", *dense, temperature=0, shearRate=rate),
            Scene("the same, force coupling", *dense, model="ForceCoupling")]
     yield [Scene("gel, phi = 0.1", *gel), Scene("the same, athermal", *gel, temperature=0)]
-    rng = np.random.default_rng(5)
-    five, any_ = rng.choice(np.linspace(0.8, 1.6, 5), count), np.exp(rng.uniform(np.log(0.5), np.log(2), count))
-    places = rng.random((count, 3))
-    yield [Scene("random spheres, phi = 0.2", *(places*mixed(np.ones(count), 0.2), mixed(np.ones(count), 0.2))),
-           Scene("mixture of five radii, 1:2", places*mixed(five, 0.2), mixed(five, 0.2), radii=five),
-           Scene("every sphere its own radius, 1:4", places*mixed(any_, 0.2), mixed(any_, 0.2), radii=any_)]
+    yield randomSpheres(count)
     for beads in (100, 1000):
         walk = chain(beads)
         yield [Scene(f"chain of {beads}, unbounded", walk, steps=30),
