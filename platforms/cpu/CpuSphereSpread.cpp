@@ -18,9 +18,21 @@ namespace {
 constexpr size_t MOST_ROW_SHAPES = 32;
 /// what is expanded: with less error, rows take more terms than are worth it
 constexpr double SMALLEST_ROW_ERROR = 1e-6;
+/// places in a grid must be an int32_t there, with what rows and planes are longer for their
+/// alignment
+constexpr double LARGEST_PLACE = 1e9;
 
 RadialWindow windowOf(const Plan& plan) {
     return RadialWindow(plan.windowSupport, plan.windowShape, plan.windowSpacing);
+}
+
+// Not those of <cmath>: calls, on a machine that is not known when this is compiled.
+int ceilOf(double x) {
+    const int towardsZero = static_cast<int>(x);
+    return towardsZero + (towardsZero < x);
+}
+int nearestTo(double x) {
+    return ceilOf(x - 0.5);
 }
 
 /** Grid points within `reach` on either side of any centre, at most. */
@@ -41,6 +53,7 @@ template <class Real> double CpuSphereSpread<Real>::bytesPerParticle(const Plan&
     const double shapes = double(plan.mixture->radii().size()) /
                           std::max<size_t>(1, plan.mixture->particleRadii().size());
     return (6 + MOST_ROW_TERMS * SPHERE_LANES) * sizeof(Real) + 7 * sizeof(int) +
+           sizeof(SphereChords) +
            shapes * (sizeof(SphereShape<Real>) + sizeof(double) +
                      (RadialWindow::MAX_DEGREE + 1) * sizeof(Real));
 }
@@ -68,11 +81,14 @@ template <class Real> void CpuSphereSpread<Real>::setBox(const Lattice& box) {
     skewX = Real(metric.skewX);
     skewZ = Real(metric.skewZ);
     widest = 0;
+    const double mostPlaces = double(size[0]) * size[1] * (size[2] + padded);
     for (size_t i = 0; i < shapes.size(); i++) {
         for (int d = 0; d < 3; d++)
             shapes[i].extent[d] = extentOf(reach[i] * pointsPerLength[d]);
         widest = std::max(widest, shapes[i].extent[0]);
-        const bool fits = std::max(shapes[i].extent[1], shapes[i].extent[2]) <= SPHERE_LANES,
+        const int* const extent = shapes[i].extent;
+        const bool fits = *std::max_element(extent, extent + 3) <= SPHERE_LANES &&
+                          size[1] >= SPHERE_LANES && mostPlaces < LARGEST_PLACE,
                    tilted = skewY != 0 || skewX != 0 || skewZ != 0;
         shapes[i].rowScale = (fits && !tilted ? rowScale[i] : Real(0));
     }
@@ -138,8 +154,10 @@ template <class Real> void CpuSphereSpread<Real>::begin(int particles) {
     Base::begin(particles);
     offset.resize(3 * size_t(particles));
     placedShape.resize(particles);
-    if (!along.empty())
-        alongWeights.resize(size_t(particles) * rowTerms * SPHERE_LANES);
+    if (along.empty())
+        return;
+    chords.resize(particles);
+    alongWeights.resize(size_t(particles) * rowTerms * SPHERE_LANES);
 }
 
 /** The lowest coordinate that a sphere at u reaches to along axis d, in grid points. */
@@ -147,12 +165,19 @@ template <class Real> double CpuSphereSpread<Real>::lowest(int shape, int d, dou
     return u - reach[shape] * pointsPerLength[d];
 }
 
+/** The grid point in the box of a point that is not far outside. */
+template <class Real> int CpuSphereSpread<Real>::wrapped(int d, int i) const {
+    while (i < 0)
+        i += size[d];
+    while (i >= size[d])
+        i -= size[d];
+    return i;
+}
+
 template <class Real>
 void CpuSphereSpread<Real>::assign(const std::vector<Vec3>& fractions, int from, int to) {
     const auto firstPoint = [&](int i, int d) {
-        const int start =
-            static_cast<int>(std::ceil(lowest(shapeOf[i], d, fractions[i][d] * size[d])));
-        return start - size[d] * static_cast<int>(std::floor(double(start) / size[d]));
+        return wrapped(d, ceilOf(lowest(shapeOf[i], d, fractions[i][d] * size[d])));
     };
     for (int i = from; i < to; i++)
         this->setColumn(i, firstPoint(i, 0), firstPoint(i, 1));
@@ -167,18 +192,15 @@ void CpuSphereSpread<Real>::place(const std::vector<Vec3>& fractions, int from, 
         for (int d = 0; d < 3; d++) {
             const double u = fractions[particle][d] * size[d], low = lowest(shape, d, u);
             // Along x and y the point that assign() found, in the image where it was found.
-            const double start = (d == 2 ? std::ceil(low) : 0);
-            mine[d] =
-                (d == 0
-                     ? this->columnX(particle)
-                     : (d == 1 ? this->columnY(particle)
-                               : static_cast<int>(start - size[2] * std::floor(start / size[2]))));
-            const double image = std::round((low - mine[d]) / size[d]);
+            mine[d] = (d == 0   ? this->columnX(particle)
+                       : d == 1 ? this->columnY(particle)
+                                : wrapped(2, ceilOf(low)));
+            const int image = nearestTo((low - mine[d]) / size[d]);
             offset[3 * size_t(slot) + d] = Real(mine[d] + size[d] * image - u);
         }
     }
     if (!along.empty())
-        loops.weighRows(spheres(), from, to, alongWeights.data());
+        loops.weighRows(spheres(), from, to, chords.data(), alongWeights.data());
 }
 
 template <class Real> GridSpheres<Real> CpuSphereSpread<Real>::spheres() const {
@@ -205,11 +227,13 @@ template <class Real> GridSpheres<Real> CpuSphereSpread<Real>::spheres() const {
             rowDegree,
             across.data(),
             along.data(),
+            chords.data(),
             alongWeights.data()};
 }
 
-template <class Real> void CpuSphereSpread<Real>::spreadPlane(int x, Real* const planes[3]) const {
-    loops.spreadPlane(spheres(), x, planes);
+template <class Real>
+void CpuSphereSpread<Real>::spreadPlanes(int x, int number, Real* const planes[3]) const {
+    loops.spreadPlanes(spheres(), x, number, planes);
 }
 
 template <class Real>

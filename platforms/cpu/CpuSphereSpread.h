@@ -24,12 +24,16 @@ public:
     void begin(int particles) override;
     void assign(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
     void place(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
-    void spreadPlane(int x, Real* const planes[3]) const override;
+    int planesTogether() const override { return PLANES_TOGETHER; }
+    void spreadPlanes(int x, int number, Real* const planes[3]) const override;
 
 protected:
     void gather(const Real* const grids[3], int from, int to) override;
 
 private:
+    /// What is found out about a sphere then serves several of its planes, and those of three grids
+    /// still fit into the caches.
+    static constexpr int PLANES_TOGETHER = 4;
     using Base = CpuSpread<Real>;
     using Base::padded, Base::size, Base::rowLength, Base::planeLength, Base::order,
         Base::columnStart, Base::first, Base::sorted;
@@ -37,6 +41,7 @@ private:
     void makeRows(const numerics::Plan& plan, const Threads& threads);
     GridSpheres<Real> spheres() const;
     double lowest(int shape, int d, double u) const;
+    int wrapped(int d, int i) const;
 
     double a; ///< unit of lengths (nm)
     SphereKernels<Real> loops = sphereKernels<Real>();
@@ -50,6 +55,7 @@ private:
     std::vector<Real> rowScale;
     int rowTerms = LEAST_ROW_TERMS, rowDegree = 0;
     std::vector<Real> across, along, alongWeights; ///< see GridSpheres
+    std::vector<SphereChords> chords;              ///< of each place, where rows are such sums
     std::vector<int> shapeOf, placedShape;         ///< of each particle, and of each place
 };
 

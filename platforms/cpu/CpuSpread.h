@@ -39,8 +39,11 @@ public:
     virtual void place(const std::vector<numerics::Vec3>& fractions, int from, int to) = 0;
     /** The forces on the particles at places [from, to), over a unit. */
     void takeForces(const std::vector<numerics::Vec3>& forces, double unit, int from, int to);
-    /** Set three planes [y][z] to the forces at x; row ends are folded back. */
-    virtual void spreadPlane(int x, Real* const planes[3]) const = 0;
+    /** How many planes spreadPlanes() does at most, and best. */
+    virtual int planesTogether() const { return 1; }
+    /** Set `number` planes [y][z] of three grids to the forces from x on; row ends are folded back.
+     */
+    virtual void spreadPlanes(int x, int number, Real* const planes[3]) const = 0;
     /**
      * u += unit times the velocities at the particles of places [from, to), from three grids whose
      * row ends repeat their beginnings. The forces are lost.

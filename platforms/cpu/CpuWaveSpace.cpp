@@ -56,7 +56,8 @@ CpuWaveSpace<Real>::CpuWaveSpace(const Plan& plan, const Lattice& box, const Thr
     }
     factors.resize(factorRow(size[1], 0, 0));
     keptChunks.assign(size[1], 0);
-    const size_t room = std::max(4 * planeLength, size_t(3 * 2) * size[0] * WAVE_LANES);
+    const size_t room = std::max((3 * spreading->planesTogether() + 1) * planeLength,
+                                 size_t(3 * 2) * size[0] * WAVE_LANES);
     for (int i = 0; i < threads.count(); i++) {
         scratch.emplace_back(new FftArray<Real>(room));
         std::fill(scratch[i]->begin(), scratch[i]->begin() + room, Real(0));
@@ -152,12 +153,17 @@ template <class Real> void CpuWaveSpace<Real>::setPositions(const std::vector<Ve
 template <class Real> void CpuWaveSpace<Real>::spread() {
     // A plane belongs to one task, which adds the particles in their order: no two threads write
     // one number.
-    threads.run(size[0], [&](int x, int thread) {
+    const int together = spreading->planesTogether();
+    threads.run((size[0] + together - 1) / together, [&](int task, int thread) {
+        const int x = task * together, number = std::min(together, size[0] - x);
         Real* const own = scratch[thread]->begin();
-        Real* const planes[3] = {own, own + planeLength, own + 2 * planeLength};
-        spreading->spreadPlane(x, planes);
+        Real* const planes[3] = {own, own + together * planeLength,
+                                 own + 2 * together * planeLength};
+        spreading->spreadPlanes(x, number, planes);
         for (int c = 0; c < 3; c++)
-            fft->planeForward(planes[c], own + 3 * planeLength, grids[c].begin() + x * planeLength);
+            for (int p = 0; p < number; p++)
+                fft->planeForward(planes[c] + p * planeLength, own + 3 * together * planeLength,
+                                  grids[c].begin() + (x + p) * planeLength);
     });
 }
 

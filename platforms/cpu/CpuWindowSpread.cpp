@@ -70,7 +70,8 @@ template <class Real> GridParticles<Real> CpuWindowSpread<Real>::particles() con
             first.data(), weights.data(), sorted.data()};
 }
 
-template <class Real> void CpuWindowSpread<Real>::spreadPlane(int x, Real* const planes[3]) const {
+template <class Real>
+void CpuWindowSpread<Real>::spreadPlanes(int x, int, Real* const planes[3]) const {
     loops.spreadPlane(particles(), x, planes);
 }
 

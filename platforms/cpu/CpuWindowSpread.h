@@ -16,7 +16,7 @@ public:
     void begin(int particles) override;
     void assign(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
     void place(const std::vector<numerics::Vec3>& fractions, int from, int to) override;
-    void spreadPlane(int x, Real* const planes[3]) const override;
+    void spreadPlanes(int x, int number, Real* const planes[3]) const override;
 
 protected:
     void gather(const Real* const grids[3], int from, int to) override;

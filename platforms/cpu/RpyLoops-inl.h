@@ -16,8 +16,9 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes. Its square must be a
-/// normal number: unused lanes are at this distance, and arithmetic with others is a hundred times slower.
+/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes. Its square must
+/// be a normal number: unused lanes are at this distance, and arithmetic with others is a hundred
+/// times slower.
 template <class Real> constexpr double SMALLEST_R2 = sizeof(Real) == 4 ? 1e-16 : 1e-30;
 
 /**

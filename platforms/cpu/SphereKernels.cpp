@@ -10,6 +10,7 @@
 #include <hwy/foreach_target.h> // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 #include "LaneNumbers-inl.h"
+#include "SphereRows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -211,13 +212,14 @@ HWY_INLINE void queuePlane(D d, const GridSpheres<Real>& g, int particle, int dx
     }
 }
 
-/** Adds forces to three planes. Not lambdas here: those are not always in line. */
+/** Adds forces to planes of three grids. Not lambdas here: those are not always in line. */
 template <class D, class Real = hn::TFromD<D>> struct AddForces {
     D d;
     size_t rowLength;
     Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
     const Real* HWY_RESTRICT forces;
     int particle = 0; ///< of the sphere that is visited
+    size_t plane = 0; ///< where the one that is visited starts
 
     HWY_INLINE void operator()(size_t at, int sphere, hn::Vec<D> w) const {
         const Real* HWY_RESTRICT force = forces + 3 * size_t(sphere);
@@ -226,7 +228,7 @@ template <class D, class Real = hn::TFromD<D>> struct AddForces {
         hn::StoreU(hn::MulAdd(w, hn::Set(d, force[2]), hn::LoadU(d, z + at)), d, z + at);
     }
     HWY_INLINE void operator()(int row, int column, hn::Vec<D> w) const {
-        (*this)(row * rowLength + column, particle, w);
+        (*this)(plane + row * rowLength + column, particle, w);
     }
 };
 
@@ -238,7 +240,8 @@ template <class D, class Real = hn::TFromD<D>> struct SumVelocities {
     hn::Vec<D> ux, uy, uz;
     size_t plane = 0; ///< where the one that is visited starts
 
-    HWY_INLINE void operator()(size_t at, int, hn::Vec<D> w) {
+    HWY_INLINE void operator()(size_t at, int, hn::Vec<D> w) { (*this)(at, w); }
+    HWY_INLINE void operator()(size_t at, hn::Vec<D> w) {
         ux = hn::MulAdd(w, hn::LoadU(d, x + at), ux);
         uy = hn::MulAdd(w, hn::LoadU(d, y + at), uy);
         uz = hn::MulAdd(w, hn::LoadU(d, z + at), uz);
@@ -248,115 +251,7 @@ template <class D, class Real = hn::TFromD<D>> struct SumVelocities {
     }
 };
 
-/** The same where places are counted from the start of a plane. */
-template <class D, class Real = hn::TFromD<D>> struct SumOfPlane {
-    SumVelocities<D>& sum;
-
-    HWY_INLINE void operator()(size_t at, hn::Vec<D> w) { sum(sum.plane + at, 0, w); }
-};
-
-/** `terms` polynomials of t at once; coefficients[degree + 1][terms], highest powers first. */
-template <int TERMS, class D, class Real = hn::TFromD<D>>
-HWY_INLINE void evaluateTerms(D d, const Real* HWY_RESTRICT coefficients, int degree, hn::Vec<D> t,
-                              hn::Vec<D>* HWY_RESTRICT terms) {
-    for (int j = 0; j < TERMS; j++)
-        terms[j] = hn::Set(d, *coefficients++);
-    for (int power = 1; power <= degree; power++)
-        for (int j = 0; j < TERMS; j++)
-            terms[j] = hn::MulAdd(terms[j], t, hn::Set(d, *coefficients++));
-}
-
-template <int TERMS, class Real>
-void weighRowsOf(const GridSpheres<Real>& g, int from, int to, Real* alongWeights) {
-    const hn::CappedTag<Real, SPHERE_LANES> d;
-    const auto one = hn::Set(d, Real(1));
-    for (int particle = from; particle < to; particle++) {
-        const int kind = g.shape[particle];
-        const Real scale = g.shapes[kind].rowScale;
-        if (scale == 0)
-            continue;
-        Real* HWY_RESTRICT out = alongWeights + size_t(particle) * TERMS * SPHERE_LANES;
-        const Real* HWY_RESTRICT along = g.along + size_t(kind) * TERMS * (g.rowDegree + 1);
-        for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-            const auto z = lanesFrom(d, g.offset[3 * size_t(particle) + 2] + k);
-            const auto t = hn::MulSub(hn::Mul(hn::Set(d, scale * g.point), z), z, one);
-            hn::Vec<decltype(d)> terms[TERMS];
-            evaluateTerms<TERMS>(d, along, g.rowDegree, hn::Min(t, one), terms);
-            for (int j = 0; j < TERMS; j++)
-                hn::StoreU(hn::IfThenElseZero(hn::Lt(t, one), terms[j]), d,
-                           out + j * SPHERE_LANES + k);
-        }
-    }
-}
-
-/** The rows that a sphere touches in one plane, and the factors of its terms there. */
-template <int TERMS, class Real> struct RowsOfPlane {
-    Real weights[TERMS][SPHERE_LANES]; ///< [term][row]
-    int from, count;                   ///< rows
-    int particle;
-
-    HWY_INLINE void set(const GridSpheres<Real>& g, int sphere, int dx) {
-        particle = sphere;
-        from = count = 0;
-        const hn::CappedTag<Real, SPHERE_LANES> d;
-        const auto one = hn::Set(d, Real(1));
-        const int kind = g.shape[particle];
-        const Real scale = g.shapes[kind].rowScale;
-        const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
-        const Real x = offset[0] + dx;
-        const auto taken = hn::Set(d, scale * g.plane * x * x - 1);
-        const Real* HWY_RESTRICT across = g.across + size_t(kind) * TERMS * (g.rowDegree + 1);
-        for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-            const auto y = lanesFrom(d, offset[1] + k);
-            const auto t = hn::MulAdd(hn::Mul(hn::Set(d, scale * g.line), y), y, taken);
-            const auto in = hn::Lt(t, one);
-            const int inside = static_cast<int>(hn::CountTrue(d, in));
-            if (inside == 0)
-                continue;
-            if (count == 0)
-                from = k + static_cast<int>(hn::FindKnownFirstTrue(d, in));
-            count += inside;
-            hn::Vec<decltype(d)> terms[TERMS];
-            evaluateTerms<TERMS>(d, across, g.rowDegree, hn::Min(t, one), terms);
-            for (int j = 0; j < TERMS; j++)
-                hn::StoreU(terms[j], d, weights[j] + k);
-        }
-    }
-};
-
-/** Calls work(at, weights) for rows of one plane; `at` is counted from its start. */
-template <int TERMS, class D, class Work, class Real = hn::TFromD<D>>
-HWY_INLINE void visitRows(D d, const GridSpheres<Real>& g, const RowsOfPlane<TERMS, Real>& rows,
-                          Work& work) {
-    const Real* HWY_RESTRICT along = g.alongWeights + size_t(rows.particle) * TERMS * SPHERE_LANES;
-    // what would else be read again after every number that is written
-    const int sizeY = g.size[1], firstY = g.first[3 * size_t(rows.particle) + 1] + rows.from,
-              firstZ = g.first[3 * size_t(rows.particle) + 2], count = rows.count;
-    const size_t rowLength = g.rowLength;
-    for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-        hn::Vec<D> terms[TERMS];
-        for (int j = 0; j < TERMS; j++)
-            terms[j] = hn::LoadU(d, along + j * SPHERE_LANES + k);
-        int y = firstY;
-        if (y >= sizeY)
-            y %= sizeY;
-        size_t at = y * rowLength + firstZ + k;
-        const Real* HWY_RESTRICT weights = rows.weights[0] + rows.from;
-        for (int row = 0; row < count; row++, weights++) {
-            auto w = hn::Mul(hn::Set(d, weights[0]), terms[0]);
-            for (int j = 1; j < TERMS; j++)
-                w = hn::MulAdd(hn::Set(d, weights[j * SPHERE_LANES]), terms[j], w);
-            work(at, w);
-            at += rowLength;
-            if (++y == sizeY) {
-                at -= sizeY * rowLength;
-                y = 0;
-            }
-        }
-    }
-}
-
-/** Adds one force to rows of three planes. */
+/** Adds one force to rows of three grids. */
 template <class D, class Real = hn::TFromD<D>> struct AddForce {
     D d;
     Real *HWY_RESTRICT x, *HWY_RESTRICT y, *HWY_RESTRICT z; ///< planes
@@ -373,77 +268,86 @@ template <class D, class Real = hn::TFromD<D>> struct AddForce {
 };
 
 /// spheres whose rows are found before they are visited: latencies overlap
-constexpr int ROW_BATCH = 8;
+constexpr int ROW_BATCH = 4;
+
+/** Planes of three grids: zeros before, and row ends folded back after. */
+template <class Real>
+void clearPlanes(const GridSpheres<Real>& g, int number, Real* const planes[3]) {
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < number * g.planeLength; i++)
+            planes[c][i] = 0;
+}
+template <class Real>
+void foldRowEnds(const GridSpheres<Real>& g, int number, Real* const planes[3]) {
+    for (int c = 0; c < 3; c++)
+        for (int p = 0; p < number; p++)
+            for (int y = 0; y < g.size[1]; y++) {
+                Real* const row = planes[c] + p * g.planeLength + y * g.rowLength;
+                for (int z = g.size[2], to = 0; z < g.size[2] + g.padding; z++) {
+                    row[to] += row[z];
+                    if (++to == g.size[2])
+                        to = 0;
+                }
+            }
+}
 
 template <int TERMS, class Real>
-void spreadPlaneOf(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
+void spreadPlanesOf(const GridSpheres<Real>& g, int x, int number, Real* const planes[3]) {
     const hn::CappedTag<Real, SPHERE_LANES> d;
-    const size_t rows = g.size[1];
-    for (int c = 0; c < 3; c++)
-        for (size_t i = 0; i < rows * g.rowLength; i++)
-            planes[c][i] = 0;
+    clearPlanes(g, number, planes);
     RowQueue<Real> queue;
     AddForces<decltype(d)> add = {d, g.rowLength, planes[0], planes[1], planes[2], g.forces};
-    RowsOfPlane<TERMS, Real> batch[ROW_BATCH];
+    SphereRows<TERMS, Real> batch[ROW_BATCH];
     int batched = 0;
     const auto visitBatch = [&]() HWY_ATTR {
         for (int b = 0; b < batched; b++) {
-            const AddForce<decltype(d)> addForce(d, planes,
-                                                 g.forces + 3 * size_t(batch[b].particle));
-            visitRows<TERMS>(d, g, batch[b], addForce);
+            const AddForce<decltype(d)> force(d, planes, g.forces + 3 * size_t(batch[b].particle));
+            visitRows<TERMS>(d, g, batch[b], force, force);
         }
         batched = 0;
     };
-    for (int dx = 0; dx < g.widest; dx++) {
-        const int column = (x - dx % g.size[0] + g.size[0]) % g.size[0];
+    // `ahead`: from the first plane of a sphere to x
+    for (int ahead = 1 - number; ahead < g.widest; ahead++) {
+        const int column = ((x - ahead) % g.size[0] + g.size[0]) % g.size[0];
+        const size_t rows = g.size[1];
         const int begin = g.columnStart[column * rows], end = g.columnStart[(column + 1) * rows];
         for (int particle = begin; particle < end; particle++) {
             const SphereShape<Real>& shape = g.shapes[g.shape[particle]];
-            if (dx >= shape.extent[0])
+            const int from = std::max(0, ahead), to = std::min(shape.extent[0], ahead + number);
+            if (from >= to)
                 continue;
-            add.particle = particle;
             if (shape.rowScale > 0) {
-                batch[batched++].set(g, particle, dx);
+                batch[batched++].find(g, particle, from, to, from - ahead);
                 if (batched == ROW_BATCH)
                     visitBatch();
-            } else if (isNarrow(d, g, shape))
-                queuePlane(d, g, particle, dx, 0, queue, add);
-            else
-                visitPlane(d, g, particle, dx, add);
+                continue;
+            }
+            add.particle = particle;
+            for (int dx = from; dx < to; dx++) {
+                add.plane = (dx - ahead) * g.planeLength;
+                if (isNarrow(d, g, shape))
+                    queuePlane(d, g, particle, dx, dx - ahead, queue, add);
+                else
+                    visitPlane(d, g, particle, dx, add);
+            }
         }
     }
     visitBatch();
     workOff(d, g, queue, add);
-    for (int c = 0; c < 3; c++)
-        for (size_t y = 0; y < rows; y++) {
-            Real* row = planes[c] + y * g.rowLength;
-            for (int z = g.size[2], to = 0; z < g.size[2] + g.padding; z++) {
-                row[to] += row[z];
-                if (++to == g.size[2])
-                    to = 0;
-            }
-        }
+    foldRowEnds(g, number, planes);
 }
 
 /** Of a sphere whose rows are sums of products. */
 template <int TERMS, class D, class Real = hn::TFromD<D>>
 HWY_INLINE void gatherRows(D d, const GridSpheres<Real>& g, int particle,
                            SumVelocities<const D>& sum) {
-    RowsOfPlane<TERMS, Real> batch[ROW_BATCH];
-    const int extent = g.shapes[g.shape[particle]].extent[0];
-    SumOfPlane<const D> inPlane = {sum};
-    int x = g.first[3 * size_t(particle)];
-    for (int from = 0; from < extent; from += ROW_BATCH) {
-        const int planes = extent - from < ROW_BATCH ? extent - from : ROW_BATCH;
-        for (int b = 0; b < planes; b++)
-            batch[b].set(g, particle, from + b);
-        for (int b = 0; b < planes; b++) {
-            sum.plane = x * g.planeLength;
-            visitRows<TERMS>(d, g, batch[b], inPlane);
-            if (++x == g.size[0])
-                x = 0;
-        }
-    }
+    SphereRows<TERMS, Real> rows;
+    rows.find(g, particle, 0, g.shapes[g.shape[particle]].extent[0], g.first[3 * size_t(particle)]);
+    SumVelocities<const D> other = sum; // two sums: one would wait for itself
+    visitRows<TERMS>(d, g, rows, sum, other);
+    sum.ux = hn::Add(sum.ux, other.ux);
+    sum.uy = hn::Add(sum.uy, other.uy);
+    sum.uz = hn::Add(sum.uz, other.uz);
 }
 
 template <int TERMS, class Real>
@@ -489,16 +393,19 @@ template <class Work> HWY_INLINE void forTerms(int terms, Work work) {
 template <class Real> struct WeighWork {
     const GridSpheres<Real>& spheres;
     int from, to;
+    SphereChords* chords;
     Real* weights;
     template <int TERMS> HWY_INLINE void run() const {
-        weighRowsOf<TERMS>(spheres, from, to, weights);
+        weighRowsOf<TERMS>(spheres, from, to, chords, weights);
     }
 };
 template <class Real> struct SpreadWork {
     const GridSpheres<Real>& spheres;
-    int x;
+    int x, number;
     Real* const* planes;
-    template <int TERMS> HWY_INLINE void run() const { spreadPlaneOf<TERMS>(spheres, x, planes); }
+    template <int TERMS> HWY_INLINE void run() const {
+        spreadPlanesOf<TERMS>(spheres, x, number, planes);
+    }
 };
 template <class Real> struct GatherWork {
     const GridSpheres<Real>& spheres;
@@ -511,12 +418,13 @@ template <class Real> struct GatherWork {
 };
 
 template <class Real>
-void weighRowsAny(const GridSpheres<Real>& g, int from, int to, Real* alongWeights) {
-    forTerms(g.rowTerms, WeighWork<Real>{g, from, to, alongWeights});
+void weighRowsAny(const GridSpheres<Real>& g, int from, int to, SphereChords* chords,
+                  Real* alongWeights) {
+    forTerms(g.rowTerms, WeighWork<Real>{g, from, to, chords, alongWeights});
 }
 template <class Real>
-void spreadPlaneAny(const GridSpheres<Real>& g, int x, Real* const planes[3]) {
-    forTerms(g.rowTerms, SpreadWork<Real>{g, x, planes});
+void spreadPlanesAny(const GridSpheres<Real>& g, int x, int number, Real* const planes[3]) {
+    forTerms(g.rowTerms, SpreadWork<Real>{g, x, number, planes});
 }
 template <class Real>
 void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const grids[3], Real* u) {
@@ -525,10 +433,10 @@ void gatherAny(const GridSpheres<Real>& g, int from, int to, const Real* const g
 
 // Dispatch tables hold functions, not templates: one name per precision.
 SphereKernels<float> singleSphereKernels() {
-    return {weighRowsAny<float>, spreadPlaneAny<float>, gatherAny<float>};
+    return {weighRowsAny<float>, spreadPlanesAny<float>, gatherAny<float>};
 }
 SphereKernels<double> doubleSphereKernels() {
-    return {weighRowsAny<double>, spreadPlaneAny<double>, gatherAny<double>};
+    return {weighRowsAny<double>, spreadPlanesAny<double>, gatherAny<double>};
 }
 
 } // namespace HWY_NAMESPACE

@@ -6,6 +6,7 @@
 // at run time.
 
 #include <cstddef>
+#include <cstdint>
 
 namespace PSE {
 
@@ -19,6 +20,11 @@ template <class Real> struct SphereShape {
     int extent[3]; ///< grid points touched along each axis, at most
     /// 0, or: rows are sums of products [T54], polynomials in t = rowScale d^2 - 1 < 1
     Real rowScale;
+};
+
+/** Of a sphere with such rows: the first one in each of its planes, and how many there are. */
+struct SphereChords {
+    int8_t first[SPHERE_LANES], count[SPHERE_LANES];
 };
 
 /// terms of such sums
@@ -43,20 +49,24 @@ template <class Real> struct GridSpheres {
      */
     Real plane, line, point, skewY, skewX, skewZ;
     const Real* forces; ///< [n][3]
-    /// Of shapes with a rowScale, none in a tilted box; both [shapes][rowDegree + 1][rowTerms].
+    /// Of shapes with a rowScale, none in a tilted box or of more than SPHERE_LANES points along an
+    /// axis, nor where places in a grid are no int32_t; both [shapes][rowDegree + 1][rowTerms].
     int rowTerms, rowDegree;
     const Real *across, *along;
-    const Real* alongWeights; ///< [n][rowTerms][SPHERE_LANES] `along` at the points of a row
+    const SphereChords* chords; ///< [n]
+    const Real* alongWeights;   ///< [n][rowTerms][SPHERE_LANES] `along` at the points of a row
 };
 
 template <class Real> struct SphereKernels {
-    /** Set alongWeights of spheres [from, to), where their shapes have them. */
-    void (*weighRows)(const GridSpheres<Real>& spheres, int from, int to, Real* alongWeights);
+    /** Set chords and alongWeights of spheres [from, to), where their shapes have them. */
+    void (*weighRows)(const GridSpheres<Real>& spheres, int from, int to, SphereChords* chords,
+                      Real* alongWeights);
     /**
-     * Set three planes [y][z] to the forces of all spheres that touch the plane x; row ends are
-     * folded back.
+     * Set `number` planes [y][z] of three grids to the forces of all spheres that touch the planes
+     * from x on, SPHERE_LANES of them at most; row ends are folded back.
      */
-    void (*spreadPlane)(const GridSpheres<Real>& spheres, int x, Real* const planes[3]);
+    void (*spreadPlanes)(const GridSpheres<Real>& spheres, int x, int number,
+                         Real* const planes[3]);
     /**
      * u[particle][3] for spheres [from, to) from the three grids, whose row ends repeat their
      * beginnings: the transpose of spreading.
