@@ -3,6 +3,7 @@
 #include "numerics/PlanCost.h"
 #include "numerics/PlanFamily.h"
 #include "numerics/ProlateSplit.h"
+#include "numerics/WindowRows.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -114,23 +115,50 @@ double MixturePlans::pairsOf(double R, bool sumImages) const {
 }
 
 double MixturePlans::cost(const Plan& plan) const {
-    const double pairs = pairsOf(plan.mixture->rangeOfPoints(), plan.sumImages);
     if (request.directSums)
-        return CostModel::directStep(composition.particles(), plan.gridPoints(), pairs, products());
+        return CostModel::directStep(composition.particles(), plan.gridPoints(),
+                                     pairsOf(plan.mixture->rangeOfPoints(), plan.sumImages),
+                                     products());
+    return spreadCost(plan) + CostModel::step(0, plan.gridPoints(), 0, 0, products()) +
+           pairCost(plan.mixture->rangeOfPoints(), plan.sumImages);
+}
+
+double MixturePlans::pairCost(double R, bool sumImages) const {
+    const double pairs = CostModel::MIXTURE_PAIR * pairsOf(R, sumImages);
+    return CostModel::step(0, 0, 0, pairs, products());
+}
+
+/** Of spreading and gathering. */
+double MixturePlans::spreadCost(const Plan& plan) const {
     const RadialWindow window = windowOf(plan);
     const double density = plan.gridPoints() / box.volume();
+    double widest = 0; // points
+    for (int d = 0; d < 3; d++)
+        widest = std::max(widest, 2 * window.reach(composition.radii.back()) * plan.grid[d] /
+                                      box.length(d));
+    const bool byRows = plan.mixture->radii().size() <= WindowRows::MOST_SHAPES &&
+                        plan.tableError >= WindowRows::SMALLEST_ERROR &&
+                        widest < WindowRows::MOST_POINTS && box.vectors().isDiagonal();
+    double cost = 0;
+    if (byRows) {
+        for (int i = 0; i < composition.size(); i++) {
+            const double reach = window.reach(composition.radii[i]);
+            cost += composition.counts[i] *
+                    (CostModel::SPREAD_SPHERE +
+                     CostModel::SPREAD_ROW * M_PI * reach * reach * std::cbrt(density * density));
+        }
+        return cost;
+    }
     int degree = 0;
     for (double a : {composition.radii.front(), composition.radii.back()})
         degree = std::max(degree, window.kernel(a, plan.tableError).polynomial.degree());
-    double touched = 0;
     for (int i = 0; i < composition.size(); i++) {
         const double outer = window.reach(composition.radii[i]),
                      inner = std::max(0.0, composition.radii[i] - window.radius());
-        touched += composition.counts[i] * density * 4 * M_PI / 3 *
-                   (outer * outer * outer - inner * inner * inner);
+        cost += composition.counts[i] * density * 4 * M_PI / 3 *
+                (outer * outer * outer - inner * inner * inner);
     }
-    return touched * (CostModel::SPREAD_RADIAL + degree * CostModel::SPREAD_POWER) +
-           CostModel::step(0, plan.gridPoints(), 0, CostModel::MIXTURE_PAIR * pairs, products());
+    return cost * (CostModel::SPREAD_RADIAL + degree * CostModel::SPREAD_POWER);
 }
 
 double MixturePlans::givenRange() const {
@@ -274,9 +302,7 @@ Plan MixturePlans::cheapest(double shortest) const {
             lowest = price;
             best = plan;
         }
-        const double pairs =
-            CostModel::MIXTURE_PAIR * pairsOf(plan.mixture->rangeOfPoints(), false);
-        if (wish.grid[0] == 0 && CostModel::step(0, 0, 0, pairs, products()) > lowest)
+        if (wish.grid[0] == 0 && pairCost(plan.mixture->rangeOfPoints(), false) > lowest)
             break;
     }
     return best;
@@ -366,13 +392,33 @@ Plan MixturePlans::tightened(const Plan& plan, double shortest) const {
     return best;
 }
 
+Plan MixturePlans::widened(const Plan& tight, const Plan& plan, double shortest) const {
+    const PlanOverrides& wish = request.overrides;
+    if (!isProlate() || wish.bandwidth > 0 || givenRange() > 0 || wish.windowSupport > 0 ||
+        wish.windowShape > 0 || plan.windowSupport >= LARGEST_SUPPORT || request.directSums)
+        return tight;
+    Plan wider = plan;
+    wider.windowSupport++;
+    wider.windowShape = shapeOf(wider.windowSupport);
+    const double least = pairCost(plan.mixture->rangeOfPoints() / MOST_TIGHTENING, plan.sumImages),
+                 now = pairCost(tight.mixture->rangeOfPoints(), tight.sumImages);
+    if (spreadCost(wider) + least >= spreadCost(tight) + now)
+        return tight;
+    predict(wider, waveErrorOf(wider));
+    wider = tightened(wider, shortest);
+    const bool serves =
+        wider.predictedError <= request.tolerance && wider.precision == tight.precision;
+    return serves && cost(wider) < cost(tight) ? wider : tight;
+}
+
 Plan MixturePlans::finishedBeyond(double shortest) const {
     Plan plan = cheapest(shortest);
     if (!plan.mixture)
         return plan;
     plan = refined(plan);
     checkPlan(plan, request);
-    plan = tightened(finished(plan, unitOf(plan)), shortest);
+    plan = finished(plan, unitOf(plan));
+    plan = widened(tightened(plan, shortest), plan, shortest);
     plan.windowSpacing = RadialWindow::spacing(box, plan.grid);
     plan.splitReason = (request.split == SplitChoice::Automatic ? "default" : "as prescribed");
     requireTolerance(plan);

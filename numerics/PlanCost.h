@@ -15,6 +15,8 @@ struct CostModel {
     static constexpr double SPREAD = 2;
     /// the same per point of the ball or shell of a radial window, and per power of its polynomial
     static constexpr double SPREAD_RADIAL = 3.7, SPREAD_POWER = 0.16;
+    /// the same per particle whose rows are sums of products [T54], and per row
+    static constexpr double SPREAD_SPHERE = 100, SPREAD_ROW = 12;
     /// per grid point: six real transforms, noise, wave factor
     static constexpr double GRID = 75;
     /// per particle and mode of a direct sum, there and back
@@ -22,8 +24,8 @@ struct CostModel {
     /// per ordered pair in range: distance and coefficients
     static constexpr double PAIR_BUILD = 30;
     static constexpr double PAIR_APPLY = 5; ///< per ordered pair in range and product with M_R
-    /// times both for a pair of a mixture: more candidates beyond its own range, longer polynomials
-    static constexpr double MIXTURE_PAIR = 1.7;
+    /// times both for a pair of a mixture: longer formulas, but fuller vectors
+    static constexpr double MIXTURE_PAIR = 1.2;
 
     /**
      * @param pairs   ordered pairs (images included) in range

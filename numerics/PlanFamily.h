@@ -175,6 +175,9 @@ private:
     bool isProlate() const { return request.split != SplitChoice::Hasimoto; }
     RadialWindow windowOf(const Plan& plan) const;
     double pairsOf(double range, bool sumImages) const;
+    // parts of cost():
+    double spreadCost(const Plan& plan) const;
+    double pairCost(double range, bool sumImages) const;
     double largestDiameter() const { return 2 * composition.radii.back(); }
     /** R of what is prescribed; 0 if nothing is. */
     double givenRange() const;
@@ -191,6 +194,12 @@ private:
      * forces stays beyond `shortest`.
      */
     Plan tightened(const Plan& plan, double shortest) const;
+    /**
+     * `tight`, or what is cheaper: a wider window on the same grid, which leaves more of the error
+     * to a shorter range.
+     * @param plan  before it was tightened
+     */
+    Plan widened(const Plan& tight, const Plan& plan, double shortest) const;
     std::shared_ptr<const Mixture> hasimotoMixture(double xi) const;
     /** Candidate with a prolate range R, or Hasimoto's xi, and the grid of a closed rule. */
     Plan at(double parameter) const;

@@ -20,6 +20,10 @@ struct WindowRows {
     double scale;
     std::vector<Polynomial> across, along; ///< none: more than MOST_TERMS or MAX_DEGREE were needed
     static constexpr int MOST_TERMS = 5, MAX_DEGREE = 16;
+    // where platforms use them
+    static constexpr size_t MOST_SHAPES = 32;      ///< distinct radii: each takes milliseconds
+    static constexpr int MOST_POINTS = 8;          ///< of a sphere along an axis
+    static constexpr double SMALLEST_ERROR = 1e-6; ///< with less, rows take more terms than pay
 
     int terms() const { return static_cast<int>(along.size()); }
     int degree() const { return along.empty() ? 0 : along[0].degree(); }

@@ -11,13 +11,10 @@ using namespace PSE::numerics;
 namespace PSE {
 
 static_assert(MOST_ROW_TERMS == WindowRows::MOST_TERMS, "every expansion has its loop");
+static_assert(SPHERE_LANES == WindowRows::MOST_POINTS, "a row is one vector, or a few");
 
 namespace {
 
-/// distinct radii up to which rows are expanded: each takes milliseconds
-constexpr size_t MOST_ROW_SHAPES = 32;
-/// what is expanded: with less error, rows take more terms than are worth it
-constexpr double SMALLEST_ROW_ERROR = 1e-6;
 /// places in a grid must be an int32_t there, with what rows and planes are longer for their
 /// alignment
 constexpr double LARGEST_PLACE = 1e9;
@@ -125,7 +122,7 @@ void CpuSphereSpread<Real>::makeRows(const Plan& plan, const Threads& threads) {
     const std::vector<double>& radii = plan.mixture->radii();
     const size_t n = radii.size();
     rowScale.assign(n, Real(0));
-    if (n > MOST_ROW_SHAPES || plan.windowError < SMALLEST_ROW_ERROR)
+    if (n > WindowRows::MOST_SHAPES || plan.windowError < WindowRows::SMALLEST_ERROR)
         return;
     const RadialWindow window = windowOf(plan);
     std::vector<WindowRows> rows(n);
