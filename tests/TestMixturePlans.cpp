@@ -244,6 +244,24 @@ TEST(MixturePlans, TheRangeIsTheShortestThatTheGridBears) {
     }
 }
 
+TEST(MixturePlans, AWiderWindowIsTakenWhereAShorterRangePaysForIt) {
+    std::vector<double> radii;
+    for (int i = 0; i < 500; i++)
+        radii.push_back(1 + 0.25 * (i % 5));
+    PlanRequest r = request(radii, 0.2, 1e-3);
+    for (int points : {18, 20}) {
+        r.overrides = {};
+        r.overrides.grid = {points, points, points};
+        const Plan plan = makePlan(r);
+        EXPECT_EQ(plan.windowSupport, 5) << points;
+        EXPECT_LE(plan.predictedError, r.tolerance) << points;
+        r.overrides.windowSupport = 4; // serves, too
+        const Plan narrow = makePlan(r);
+        EXPECT_LE(narrow.predictedError, r.tolerance) << points;
+        EXPECT_LT(plan.realCutoff, 0.98 * narrow.realCutoff) << points;
+    }
+}
+
 TEST(MixtureErrors, WaveErrorBoundsTheMeasuredError) {
     std::mt19937 random(11);
     std::uniform_real_distribution<double> uniform;

@@ -9,6 +9,7 @@
 #endif
 
 #include <hwy/highway.h>
+#include <limits>
 
 HWY_BEFORE_NAMESPACE();
 namespace PSE {
@@ -16,10 +17,12 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes. Its square must
-/// be a normal number: unused lanes are at this distance, and arithmetic with others is a hundred
-/// times slower.
+/// In radii squared: below, pairs count as this far apart; C d d^T then vanishes.
 template <class Real> constexpr double SMALLEST_R2 = sizeof(Real) == 4 ? 1e-16 : 1e-30;
+// Unused lanes are at this distance, and arithmetic with subnormal numbers takes a hundred times as
+// long.
+static_assert(SMALLEST_R2<float> * SMALLEST_R2<float> > std::numeric_limits<float>::min(),
+              "squares of distances in the formulas below are normal numbers");
 
 /**
  * F and C = (G - F)/r^2 of the tensor of spheres of any radii, apart, overlapping, or one inside
