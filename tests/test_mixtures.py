@@ -138,6 +138,28 @@ def testClusterOfTheSmallestSpheres(platformName, name, radii):
             assert ratio <= 1, f"{kind} at {tolerance:g}: error {ratio:.2f} tolerance"
 
 
+@pytest.mark.hostOnly  # devices have the same Plan and tables; their kernels know of no number of radii
+@pytest.mark.withGrid
+@pytest.mark.parametrize("widest", [2.5, 10])
+def testTenThousandRadiiOfTheirOwn(platformName, widest):
+    """
+    Twenty neighbours among ten thousand spheres, no two of one radius, are pulled: direct sums for them and for
+    twenty others anywhere, in the norm of the contract.
+    """
+    s = mixture(logUniform(0.3, 0.3*widest, 10000, 72), 0.2, scenes.cube(1), 72)
+    assert len(set(s.radii)) == 10000
+    near = np.argsort(np.linalg.norm(scenes.nearestImages(s.positions - s.positions[2], s.box), axis=1))
+    chosen = np.concatenate([near[:20], near[20:5000:249]])
+    few = Scene(s.positions[chosen], s.box, s.radius, s.radii[chosen])
+    pulls = randomForces(few)*(np.arange(few.count) < 20)[:, None]
+    forces = np.zeros((s.count, 3))
+    forces[chosen] = pulls
+    for tolerance in (1e-3, 1e-5):
+        context, integrator = makeContext(s, platformName, tolerance=tolerance)
+        u = integrator.applyMobility(forces)[chosen]
+        assert errorRatio(u, few.velocities(pulls), pulls, few) <= tolerance
+
+
 @pytest.mark.parametrize("name", ["twoSizesOverlapping", "nested", "smallBox"])
 def testWorstForce(platformName, name):
     """The whole error matrix, forces measured by the velocities that they would give alone."""
