@@ -20,6 +20,10 @@ constexpr int STEPS = 5;
 /// dt D0/a^2 so small that rounding elsewhere leads no trajectory astray
 constexpr double SHORT_STEP = 1e-6;
 constexpr double BOX_OF_CHAIN = 60; ///< nm: thin, as for a molecule in its solvent
+constexpr double STRAIN = 0.02;     ///< per step: none of those counted flips the box
+
+/** What a case has besides equal spheres in a still periodic fluid. */
+enum class Effect { None, FiveRadii, Shear, Unbounded, ForceCoupling, FreeDraining };
 
 /** What is simulated. */
 struct Case {
@@ -28,6 +32,7 @@ struct Case {
     double phi; ///< volume fraction of a suspension; 0: a compact chain
     double tolerance;
     bool thermal;
+    Effect effect = Effect::None;
 };
 
 constexpr Case CASES[] = {
@@ -36,6 +41,12 @@ constexpr Case CASES[] = {
     {"suspension 1e-6 with noise", 500, 0.1, 1e-6, true},
     {"suspension 1e-6 without noise", 500, 0.1, 1e-6, false},
     {"chain 1e-3 with noise", 200, 0, 1e-3, true},
+    {"five radii 1e-3 with noise", 1000, 0.1, 1e-3, true, Effect::FiveRadii},
+    {"sheared 1e-3 with noise", 1000, 0.1, 1e-3, true, Effect::Shear},
+    {"sheared 1e-3 without noise", 1000, 0.1, 1e-3, false, Effect::Shear},
+    {"unbounded chain 1e-3 with noise", 200, 0, 1e-3, true, Effect::Unbounded},
+    {"force coupling 1e-3 with noise", 1000, 0.1, 1e-3, true, Effect::ForceCoupling},
+    {"free draining", 1000, 0.1, 1e-3, true, Effect::FreeDraining},
 };
 
 /** Constant forces that cost next to nothing: what is counted is the fluid. */
@@ -59,6 +70,21 @@ void addBonds(System& system, int n) {
     system.addForce(bonds);
 }
 
+void addEffect(PSEBrownianIntegrator& integrator, const Case& scene) {
+    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    if (scene.effect == Effect::Unbounded)
+        integrator.setFluidBoundary(PSEBrownianIntegrator::Unbounded);
+    if (scene.effect == Effect::FiveRadii)
+        for (int i = 0; i < scene.particles; i++) // 1:2, the mean is that of the other cases
+            integrator.setParticleRadius(i, RADIUS * (4 + i % 5) / 6);
+    if (scene.effect == Effect::Shear)
+        integrator.setShearRate(STRAIN / integrator.getStepSize());
+    if (scene.effect == Effect::ForceCoupling)
+        integrator.setMobilityModel(PSEBrownianIntegrator::ForceCoupling);
+    if (scene.effect == Effect::FreeDraining)
+        integrator.setMobilityModel(PSEBrownianIntegrator::FreeDraining);
+}
+
 /** Counted: STEPS steps. */
 void run(const Case& scene) {
     const bool chain = (scene.phi == 0);
@@ -72,7 +98,7 @@ void run(const Case& scene) {
     PSEBrownianIntegrator integrator(scene.thermal ? TEMPERATURE : 0, VISCOSITY, RADIUS,
                                      diffusiveStep(SHORT_STEP));
     integrator.setErrorTolerance(scene.tolerance);
-    integrator.setFluidBoundary(PSEBrownianIntegrator::Periodic);
+    addEffect(integrator, scene);
     integrator.setRandomNumberSeed(1);
     Context context(*system, integrator, Platform::getPlatformByName("CPU"), {{"Threads", "1"}});
     const std::vector<Vec3> positions = (chain ? compactChain(n) : jitteredLattice(n, scene.phi, true));
