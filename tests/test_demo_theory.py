@@ -110,7 +110,7 @@ def test_one_step_diffusion():
 
 
 def test_effects_are_read_from_the_description():
-    description = "waves: on (why)\nnoise: on\nshear flow: off (rate 0)\nstep: 2 ps"
+    description = "waves: on (how), because\nnoise: on\nshear flow: off, because the rate is 0\nstep: 2 ps"
     assert report.effects(description) == "Effects on: waves, noise; off: shear flow."
 
 

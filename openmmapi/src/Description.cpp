@@ -81,25 +81,26 @@ void describeRadii(std::ostream& out, const Scene& scene, const NumericalParamet
 void describeShear(std::ostream& out, const Scene& scene, const PSEBrownianIntegrator& integrator,
                    double strain) {
     using Pse = PSEBrownianIntegrator;
-    const double time = integrator.getShearTime();
-    out << "shear flow: ";
-    if (integrator.getShearRate() == 0)
-        out << "off (shear rate 0";
+    const double rate = integrator.getShearRate(), time = integrator.getShearTime();
+    if (rate == 0)
+        out << "shear flow: off, because the shear rate is 0";
     else {
-        out << "on (rate " << integrator.getShearRate() << " /ps";
-        if (integrator.getShearProtocol() == Pse::OscillatoryShear)
-            out << " at the peak, oscillatory with period " << time << " ps";
+        const bool oscillates = (integrator.getShearProtocol() == Pse::OscillatoryShear);
+        out << "shear flow: on (";
+        if (oscillates)
+            out << "oscillatory with period " << time << " ps";
         else if (integrator.getShearProtocol() == Pse::StartUpShear)
-            out << " from time " << time << " ps on";
+            out << "from time " << time << " ps on";
         else
-            out << ", steady";
-        out << (scene.periodicBox ? ", the box tilts with it" : ", no box");
+            out << "steady";
+        out << (scene.periodicBox ? ", the box tilts with it" : ", no box") << "), because the "
+            << (oscillates ? "largest " : "") << "shear rate of " << rate << " /ps is not 0";
     }
-    if (integrator.getShearRate() != 0 || strain != 0)
-        out << ", strain so far " << strain;
-    out << ")" << endl;
+    if (rate != 0 || strain != 0)
+        out << "; strain so far " << strain;
+    out << endl;
     if (!scene.barostat.empty())
-        out << "box: moved by a " << scene.barostat << endl;
+        out << "box: moves, because the System has a " << scene.barostat << endl;
 }
 
 void describeStages(std::ostream& out, const std::vector<StageTime>& stages) {
@@ -129,18 +130,22 @@ std::string describeScene(const Scene& scene, const PSEBrownianIntegrator& integ
     out << std::setprecision(4);
     const double a = scene.radii.empty() ? integrator.getRadius() : scene.radii[0];
     if (scene.hydrodynamics)
-        out << "hydrodynamic interactions: on (" << scene.modelReason << ")" << endl
+        out << "hydrodynamic interactions: on (" << scene.model
+            << "), because the mobility model is not FreeDraining" << endl
             << "fluid: "
             << (scene.unbounded ? "unbounded, whatever the box of the Context, "
                                 : "periodic in the box of the Context, ")
             << scene.boundaryReason << endl;
     else
-        out << "hydrodynamic interactions: off (" << scene.modelReason << "), M = 1/(6 pi eta a)"
+        out << "hydrodynamic interactions: off, because the mobility model is FreeDraining: "
+               "M = 1/(6 pi eta a)"
             << endl;
     if (integrator.getTemperature() > 0)
-        out << "thermal noise: on (temperature above 0), seed " << parameters.randomSeed << endl;
+        out << "thermal noise: on (seed " << parameters.randomSeed
+            << "), because the temperature of " << integrator.getTemperature() << " K is above 0"
+            << endl;
     else
-        out << "thermal noise: off (temperature 0)" << endl;
+        out << "thermal noise: off, because the temperature is 0" << endl;
     describeShear(out, scene, integrator, strain);
     out << "particles: " << scene.mobile.size() << " mobile, " << scene.numMassless
         << " massless (they do not move and are transparent to the fluid)" << endl;

@@ -116,11 +116,10 @@ Scene makeScene(const System& system, const PSEBrownianIntegrator& integrator) {
         chooseBoundary(system, integrator, scene);
         if (scene.forceCoupling && !scene.unbounded)
             checkForceCoupling(scene);
-        scene.modelReason = string(scene.forceCoupling ? "force coupling by Gaussian envelopes, "
-                                                       : "Rotne-Prager-Yamakawa, ") +
-                            (equalRadii(scene) ? "equal radii" : "unequal radii");
-    } else
-        scene.modelReason = "setMobilityModel(FreeDraining) was called";
+        scene.model = string(scene.forceCoupling ? "force coupling by Gaussian envelopes, "
+                                                 : "Rotne-Prager-Yamakawa, ") +
+                      (equalRadii(scene) ? "equal radii" : "unequal radii");
+    }
     scene.periodicBox =
         (scene.hydrodynamics && !scene.unbounded) || system.usesPeriodicBoundaryConditions();
     return scene;

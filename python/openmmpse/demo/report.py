@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import time
 from typing import NamedTuple
 
@@ -88,9 +89,9 @@ def descriptions(results):
 
 def effects(description):
     """One sentence from the lines "effect: on ..." and "effect: off ..." of an integrator's description."""
-    switches = [line.partition(": ") for line in description.splitlines()]
-    on = [name for name, _, state in switches if state.split(" ")[0] == "on"]
-    off = [name for name, _, state in switches if state.split(" ")[0] == "off"]
+    switches = re.findall(r"^(.+?): (on|off)\b", description, re.MULTILINE)
+    on = [name for name, state in switches if state == "on"]
+    off = [name for name, state in switches if state == "off"]
     return f"Effects on: {', '.join(on) or 'none'}; off: {', '.join(off) or 'none'}."
 
 

@@ -23,7 +23,8 @@ struct OPENMM_EXPORT_PSE Scene {
     bool periodicBox = false;
     std::string barostat;       ///< the kind of Force that moves the box; empty: none
     bool forceCoupling = false; ///< by Gaussian envelopes instead of rigid spheres' surfaces
-    std::string modelReason, boundaryReason;
+    std::string model;          ///< of the mobility, in words; empty: no hydrodynamics
+    std::string boundaryReason; ///< why the fluid is periodic, or unbounded
 };
 
 /**
