@@ -49,6 +49,8 @@ def wander(run):
     context = chain(run.seed)
 
     def observe(context):
+        with open(run.folder / "observed.txt", "a", encoding="utf-8") as file:
+            file.write(f"{run.attempt} {context.getStepCount()}\n")
         marker = run.folder / "disturbed"
         if kind != "quiet" and context.getStepCount() == 75 and not marker.exists():
             marker.touch()
@@ -93,6 +95,10 @@ def testAKilledWorkerLosesNothing(tmp_path):
         assert len(processes) == table["attempts"][i] and processes[-1] == str(int(table["process"][i]))
         if scenes[i]["kind"] == "killed":
             assert processes[0] != processes[1]  # another worker
+        # The second attempt goes on after the last checkpoint, at step 60; the first had come to 75.
+        observed = [line.split() for line in (folder / "observed.txt").read_text().splitlines()]
+        starts = {attempt: int(step) for attempt, step in reversed(observed)}
+        assert starts == ({"1": 25} if i == 0 else {"1": 25, "2": 65})
     import pandas
     kept = pandas.read_csv(tmp_path / "sweep" / "table.csv")
     assert list(kept.columns) == list(table.columns) and list(kept["attempts"]) == [1, 2, 2, 2]
