@@ -15,9 +15,13 @@ struct ShearFlow {
     double rate; ///< 1/ps
     double time; ///< ps
 
-    /** The exact integral of the rate over a step [from, from + dt]. */
+    /**
+     * The exact integral of the rate over a step [from, from + dt].
+     * @throws std::invalid_argument for a time that is not finite, or a strain that no box can
+     * follow
+     */
     double strain(double from, double dt) const;
-    /** The rate at a time (1/ps). */
+    /** The rate at a time (1/ps). @throws std::invalid_argument for a time that is not finite */
     double rateAt(double t) const;
 };
 

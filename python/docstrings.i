@@ -242,7 +242,7 @@ Raises
 TypeError
     if the radius is a Quantity of another dimension, or the index not an integer
 openmm.OpenMMException
-    if the index is negative, the radius not positive and finite, or a Context exists
+    if the index is negative, the radius not in [1e-15, 1e15] nm, or a Context exists
 %}
 %feature("docstring") PSE::PSEBrownianIntegrator::getParticleRadii %{
 Get the radii that setParticleRadius() set.

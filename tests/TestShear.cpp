@@ -76,6 +76,19 @@ TEST(ShearFlow, RateIsTheDerivativeOfTheStrain) {
     EXPECT_EQ((ShearFlow{Protocol::StartUp, 0.3, 2}.rateAt(2)), 0.3);
 }
 
+TEST(ShearFlow, WhatHasNoStrainIsRefused) {
+    using Protocol = ShearFlow::Protocol;
+    for (Protocol protocol : {Protocol::Steady, Protocol::Oscillatory, Protocol::StartUp}) {
+        const ShearFlow flow = {protocol, 0.3, 7};
+        for (double t : {std::nan(""), HUGE_VAL}) {
+            EXPECT_THROW(flow.strain(t, 1), std::invalid_argument);
+            EXPECT_THROW(flow.rateAt(t), std::invalid_argument);
+        }
+    }
+    EXPECT_EQ((ShearFlow{Protocol::Steady, 1e8, 0}.strain(0, 10)), 1e9);
+    EXPECT_THROW((ShearFlow{Protocol::Steady, -2e8, 0}.strain(0, 10)), std::invalid_argument);
+}
+
 TEST(Lattice, DeformedIsTheImageOfTheLattice) {
     for (const Lattice& box :
          {Lattice::orthorhombic(3, 4, 5), Lattice(Vec3(4, 0, 0), Vec3(2, 3, 0), Vec3(-2, 1.5, 5)),

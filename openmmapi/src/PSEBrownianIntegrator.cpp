@@ -17,6 +17,8 @@ namespace PSE {
 namespace {
 
 constexpr double SMALLEST_TOLERANCE = 1e-10, LARGEST_TOLERANCE = 1e-1;
+/// nm: far beyond all bodies in a fluid, and near enough that no power of one overflows
+constexpr double SMALLEST_RADIUS = 1e-15, LARGEST_RADIUS = 1e15;
 constexpr int SMALLEST_SUPPORT = 3, LARGEST_SUPPORT = 16;
 constexpr double SMALLEST_BANDWIDTH = 3, LARGEST_BANDWIDTH = 30;
 /// the entries of a box in a State, row by row
@@ -40,6 +42,22 @@ void requireInRange(const char* name, double value, double low, double high) {
     std::ostringstream message;
     message << name << " is " << value << "; it must lie in [" << low << ", " << high << "]";
     refuse(message.str());
+}
+
+void requireRadius(const char* name, double value) {
+    requirePositive(name, value, "nm");
+    if (value >= SMALLEST_RADIUS && value <= LARGEST_RADIUS)
+        return;
+    std::ostringstream message;
+    message << name << " is " << value << " nm; it must lie in [" << SMALLEST_RADIUS << ", "
+            << LARGEST_RADIUS << "] nm: give it in nm, or as a Quantity with its unit";
+    refuse(message.str());
+}
+
+void requireIndex(int index) {
+    if (index < 0)
+        refuse("particle index is " + std::to_string(index) +
+               "; it must not be negative: the first particle has index 0");
 }
 
 void writeBox(SerializationNode& node, const Vec3 box[3]) {
@@ -101,8 +119,8 @@ void PSEBrownianIntegrator::requireUnbound(const char* setter) const {
 
 void PSEBrownianIntegrator::requireBound(const char* method) const {
     if (context == NULL)
-        refuse(string(method) +
-               " needs a Context: this integrator is not bound to a context! Create one first");
+        refuse(string(method) + " needs a Context, and this integrator is not bound to one; create "
+                                "it with openmm.Context(system, integrator)");
 }
 
 void PSEBrownianIntegrator::requirePositions(const char* method) const {
@@ -139,7 +157,7 @@ void PSEBrownianIntegrator::setViscosity(double value) {
 
 void PSEBrownianIntegrator::setRadius(double value) {
     requireUnbound("setRadius");
-    requirePositive("radius", value, "nm");
+    requireRadius("radius", value);
     radius = value;
 }
 
@@ -149,15 +167,15 @@ void PSEBrownianIntegrator::setStepSize(double size) {
 }
 
 double PSEBrownianIntegrator::getParticleRadius(int index) const {
-    requireInRange("particle index", index, 0, 2147483647.0);
+    requireIndex(index);
     const auto own = particleRadii.find(index);
     return own == particleRadii.end() ? radius : own->second;
 }
 
 void PSEBrownianIntegrator::setParticleRadius(int index, double value) {
     requireUnbound("setParticleRadius");
-    requireInRange("particle index", index, 0, 2147483647.0);
-    requirePositive("particle radius", value, "nm");
+    requireIndex(index);
+    requireRadius("particle radius", value);
     particleRadii[index] = value;
 }
 

@@ -53,8 +53,7 @@ template <class T> T read(std::istream& stream) {
     if (!stream)
         throw OpenMMException(
             "PSEBrownianIntegrator: the checkpoint ends early; it is truncated or was not written "
-            "with "
-            "PSEBrownianIntegrator. Create a new one with Context.createCheckpoint");
+            "with PSEBrownianIntegrator. Create a new one with Context.createCheckpoint");
     return value;
 }
 
@@ -77,6 +76,15 @@ std::vector<OmmVec3> rowsOf(const Matrix3& matrix) {
     for (int d = 0; d < 3; d++)
         rows.emplace_back(matrix(d, 0), matrix(d, 1), matrix(d, 2));
     return rows;
+}
+
+/** What a call returns; refusals of the numerics get the name of the integrator. */
+template <class Call> auto named(const Call& call) {
+    try {
+        return call();
+    } catch (const std::invalid_argument& refusal) {
+        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
+    }
 }
 
 /** @throws std::invalid_argument */
@@ -221,11 +229,7 @@ void PlannedStepKernel::planUnbounded(const PSEBrownianIntegrator& integrator) {
 Lattice PlannedStepKernel::currentBox() const {
     OmmVec3 box[3];
     boxVectors(box);
-    try {
-        return latticeOf(box);
-    } catch (const std::invalid_argument& refusal) {
-        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
-    }
+    return named([&] { return latticeOf(box); });
 }
 
 bool PlannedStepKernel::isSheared() const {
@@ -233,7 +237,9 @@ bool PlannedStepKernel::isSheared() const {
 }
 
 double PlannedStepKernel::strainOf(double time, double dt) const {
-    return settings->getShearRate() == 0 ? 0 : flowOf(*settings).strain(time, dt);
+    if (settings->getShearRate() == 0)
+        return 0;
+    return named([&] { return flowOf(*settings).strain(time, dt); });
 }
 
 std::vector<OmmVec3> PlannedStepKernel::computeStress(ContextImpl& context,
@@ -244,9 +250,10 @@ std::vector<OmmVec3> PlannedStepKernel::computeStress(ContextImpl& context,
     if (parts & PSEBrownianIntegrator::IdealStress)
         stress += idealStress(double(scene.mobile.size()),
                               KT_PER_KELVIN * integrator.getTemperature(), volume);
-    if (parts & PSEBrownianIntegrator::HydrodynamicStress)
-        stress += singleSphereStress(scene.radii, viscosity,
-                                     flowOf(integrator).rateAt(context.getTime()), volume);
+    if (parts & PSEBrownianIntegrator::HydrodynamicStress) {
+        const double rate = named([&] { return flowOf(integrator).rateAt(context.getTime()); });
+        stress += singleSphereStress(scene.radii, viscosity, rate, volume);
+    }
     if (parts & PSEBrownianIntegrator::InterparticleStress)
         stress += interparticleStress(context, groups);
     return rowsOf(stress);
@@ -359,7 +366,8 @@ void PlannedStepKernel::refuseFarAway(int particle, const Vec3& position, bool n
     else
         message << FARTHEST << " boxes, and its place in the box is lost to rounding; set "
                 << "positions nearer to the box";
-    message << ", and if steps have brought it there, use a smaller step size";
+    message << ", and if steps have brought it there, use a smaller step size"
+            << (settings->getShearRate() != 0 ? " or a lower shear rate" : "");
     throw OpenMMException(message.str());
 }
 
@@ -452,11 +460,7 @@ NumericalParameters PlannedStepKernel::getNumericalParameters() const {
 }
 
 PlannedStepKernel::Prepared PlannedStepKernel::prepared(const PlanRequest& next) const {
-    try {
-        return {next, makePlan(next)};
-    } catch (const std::invalid_argument& refusal) {
-        throw OpenMMException(string("PSEBrownianIntegrator: ") + refusal.what());
-    }
+    return named([&] { return Prepared{next, makePlan(next)}; });
 }
 
 string PlannedStepKernel::signature(const Plan& plan) const {

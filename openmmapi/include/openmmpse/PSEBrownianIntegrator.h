@@ -154,7 +154,7 @@ public:
     /**
      * Give one particle a hydrodynamic radius of its own.
      * @param index   index of the particle in the System, >= 0
-     * @param radius  its radius (in nm), > 0
+     * @param radius  its radius (in nm), from 1e-15 to 1e15
      */
     void setParticleRadius(int index, double radius);
     /**
