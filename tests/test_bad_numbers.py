@@ -4,10 +4,12 @@ Numbers that are legal one by one and lead nowhere are refused by their own name
 remedy, and not by what breaks later because of them.
 """
 import numpy as np
+import openmm
 import pytest
 
 import scenes
-from openmmpse import PSEBrownianIntegrator
+from openmmpse import PSEBrownianIntegrator, accuracy
+from platformnames import contextOn
 from scenes import ETA, makeContext, positionsOf
 from test_bad_input import assertMentions, makeIntegrator, messageOf
 
@@ -80,3 +82,42 @@ def testWithoutAContext():
     message = messageOf(makeIntegrator().step, 1)
     assertMentions(message, "step needs a Context", "not bound", "openmm.Context(system, integrator)")
     assert "!" not in message
+
+
+# ---------------------------------------------------------------- advice on the time step
+
+def springs(count):
+    force = openmm.HarmonicBondForce()
+    for i in range(count - 1):
+        force.addBond(i, i + 1, 1.0, 500.0)
+    return force
+
+
+def pile(platformName, count):
+    """A chain whose beads are all at one place."""
+    s = scenes.Scene(np.zeros((count, 3)), scenes.cube(20.0), 0.5)
+    return makeContext(s, platformName, 300.0, 0.05, forces=[springs(count)],
+                       boundary=PSEBrownianIntegrator.Unbounded)
+
+
+@pytest.mark.hostOnly
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [2, 5])
+def testAdviceForBeadsAtOnePlace(platformName, count):
+    """Beads part by their noise: advice as for a chain that is stretched, within what its shape changes."""
+    context, integrator = pile(platformName, count)
+    advice = accuracy.recommendStep(context)
+    line, _ = pile(platformName, count)
+    line.setPositions(np.arange(count)[:, None]*np.eye(3)[0])
+    stretched = accuracy.recommendStep(line)
+    assert 0.3 < advice.recommended/stretched.recommended < 3
+    assert np.all(positionsOf(context) == 0)
+
+
+@pytest.mark.hostOnly
+def testNoAdviceWithoutPositions(platformName):
+    s = scenes.Scene(np.zeros((3, 3)), scenes.cube(20.0), 0.5)
+    context = contextOn(platformName, scenes.makeSystem(s, [springs(3)]), makeIntegrator())
+    for call in (accuracy.recommendStep, accuracy.measure):
+        with pytest.raises(accuracy.SceneError, match="positions.*setPositions"):
+            call(context)

@@ -76,7 +76,7 @@ class Scene:
         if platform in (None, name) and properties is None:
             names = context.getPlatform().getPropertyNames()
             properties = {key: context.getPlatform().getPropertyValue(context, key) for key in names}
-        return cls(
+        scene = cls(
             context.getSystem(),
             state.getPositions(asNumpy=True),
             context.getIntegrator(),
@@ -84,6 +84,13 @@ class Scene:
             platform or name,
             properties,
         )
+        try:
+            context.getState(forces=True)  # a State tells zeros where no positions have been set
+        except openmm.OpenMMException as error:
+            raise SceneError(
+                f"no forces can be computed in this Context ({error}); set positions by Context.setPositions"
+            ) from error
+        return scene
 
     @property
     def count(self):

@@ -104,7 +104,7 @@ def _step(scene, rate, bias):
     """(step in ps or None, what limits it)"""
     limits = []
     if rate > 0:
-        limits.append((2 * bias / ((1 + bias) * rate), f"a bias of {bias:g} in the stiffest mode"))
+        limits.append((2 * bias / ((1 + bias) * rate), f"a variance of the stiffest mode that is {100 * bias:g} % too large"))
     diffusion = scene.thermalEnergy * scene.freeMobility
     if diffusion > 0 and scene.hasFluid:
         limits.append(
@@ -128,7 +128,8 @@ def stiffestRate(probe, positions):
     g = np.random.default_rng(8).normal(size=before.shape)
     for n in range(min(ITERATIONS, 3 * scene.count)):
         u = probe.velocitiesAt(positions, g)
-        length = np.sqrt(np.sum(g * u))
+        # Spheres at one place move as one: for forces that part them, g.M g is 0, and rounding may make it negative.
+        length = np.sqrt(max(np.sum(g * u), 0.0))
         if n > 0:
             if length <= 1e-3 * max(largest, least):
                 break
