@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What unequal radii cost: a thermal step of five radii in units of one of equal spheres.
 
-The random spheres of effect_costs.py, with the Plans that are automatic and with those of grids prescribed to both, each
+The random spheres of effect_costs.py in one box, with the Plans that are automatic and with those of grids prescribed to both, each
 with its best range there. Both Contexts live in one process and take single steps in turn, each first every other time; the
 figure is the median of the ratios of such pairs of steps, in processor time on one thread.
 """
@@ -11,28 +11,24 @@ import time
 import numpy as np
 
 import effect_costs
-from openmmpse.accuracy import stages
 
 
-def scenesOf(count, points):
+def variantsOf(count, points):
     """Equal spheres and the mixture, on a grid of so many points per axis, or each on its own: 0."""
-    scenes = effect_costs.randomSpheres(count)[:2]
-    for scene in scenes:
-        scene.points = points
-    return scenes
+    scene = effect_costs.Scene(*effect_costs.randomSpheres(count), radii=())
+    return [effect_costs.Variant(scene, radii, points=points) for radii in (effect_costs.EQUAL, effect_costs.FIVE)]
 
 
-def ratios(scenes, rounds):
+def ratios(variants, rounds):
     """Of times of single steps taken in turn."""
-    for scene in scenes:
-        scene.integrator.step(5)
-        scene.integrator.getStageTimes()
+    for variant in variants:
+        variant.integrator.step(5)
     for turn in range(rounds):
-        for scene in scenes if turn % 2 == 0 else scenes[::-1]:
+        for variant in variants if turn % 2 == 0 else variants[::-1]:
             start = time.process_time()
-            scene.integrator.step(1)
-            scene.seconds.append(time.process_time() - start)
-    return np.array(scenes[1].seconds)/np.array(scenes[0].seconds)
+            variant.integrator.step(1)
+            variant.seconds.append(time.process_time() - start)
+    return np.array(variants[1].seconds)/np.array(variants[0].seconds)
 
 
 def main():
@@ -46,19 +42,18 @@ def main():
     print("| grid asked for | grid of the equal spheres | of the mixture | ms | ms | mixture / equal | middle half |")
     print("|---|---|---|---:|---:|---:|---|")
     for points in arguments.grids:
-        scenes = scenesOf(arguments.particles, points)
-        for scene in scenes:
-            scene.start(arguments.threads)
-        found = ratios(scenes, arguments.rounds)
+        variants = variantsOf(arguments.particles, points)
+        for variant in variants:
+            variant.start(arguments.threads)
+        found = ratios(variants, arguments.rounds)
         cells = [f"{points}³" if points else "automatic"]
-        cells += ["x".join(map(str, scene.integrator.getNumericalParameters()["gridDimensions"])) for scene in scenes]
-        cells += [f"{1e3*np.median(scene.seconds):.1f}" for scene in scenes]
+        cells += ["x".join(map(str, v.integrator.getNumericalParameters()["gridDimensions"])) for v in variants]
+        cells += [f"{v.milliseconds:.1f}" for v in variants]
         cells += [f"{np.median(found):.3f}", "{:.2f} to {:.2f}".format(*np.percentile(found, [25, 75]))]
         print("| " + " | ".join(cells) + " |", flush=True)
         if arguments.stages:
-            for scene in scenes:
-                print(scene.name, {part: round(cell, 2) for part, cell in scene.row()[1].items()},
-                      scene.integrator.getNumericalParameters(), scene.integrator.getStageTimes())
+            for variant in variants:
+                print(variant.radii, variant.integrator.getNumericalParameters(), variant.integrator.getStageTimes())
 
 
 if __name__ == "__main__":

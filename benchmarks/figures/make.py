@@ -22,6 +22,7 @@ import grid
 import scaling
 import splitting
 import targets
+import texts
 from tqdm import tqdm
 
 FIGURES = {module.NAME: module for module in (error, grid, effects, scaling, splitting, baseline, conditioning, targets)}
@@ -85,13 +86,7 @@ def picture(module, folder):
 
 def fill(path, name, rows):
     """Put the table of a figure between its markers in the text."""
-    text = path.read_text(encoding="utf-8")
-    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-    if text.count(begin) != 1 or text.count(end) != 1:
-        raise ValueError(f"{path} must contain the lines {begin.strip()} and {end} once each")
-    head, rest = text.split(begin)
-    _, tail = rest.split(end)
-    path.write_text(head + begin + "\n".join(FIGURES[name].table(rows)) + "\n" + end + tail, encoding="utf-8")
+    texts.fill(path, name, FIGURES[name].table(rows))
 
 
 if __name__ == "__main__":
