@@ -6,7 +6,7 @@ test_platforms.py tells it, by a skipped test for each.
 """
 import pytest
 
-from hardcases import HARD_CASE, HardCase, writeTable
+from hardcases import HARD_CASE, HardCase, described, keepRows, rowsOf, writePage
 from platformnames import DEVICES, NAMES, VARIANTS, absence, familyOf, isDevice, isDirect
 
 NOWHERE = pytest.param(None, id="nowhere")
@@ -29,7 +29,7 @@ def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="hard cases in full, not in their short form")
     parser.addoption("--fuzz-seed", type=int, default=1, help="draws other random scenes (default: 1)")
     parser.addoption("--fuzz-scenes", type=int, help="number of random scenes on each platform")
-    parser.addoption("--torture-table", metavar="FILE", help="write the table of hard cases here")
+    parser.addoption("--torture-table", metavar="PAGE", help="fill the tables of hard cases of this page")
 
 
 def pytest_configure(config):
@@ -87,17 +87,30 @@ def pytest_collection_modifyitems(config, items):
     items.sort(key=lambda item: item.path.name == "test_cuda_kernels.py")
 
 
+def pytest_report_header(config):
+    return (f"hard cases: {'long' if config.getoption('long') else 'short'} form, random scenes with seed "
+            f"{config.getoption('fuzz_seed')} (--fuzz-seed), all other seeds fixed")
+
+
 def pytest_terminal_summary(terminalreporter):
-    """Tables that tests recorded as a property are printed, whatever the outcome."""
+    """Tables that tests recorded as a property are printed, whatever the outcome; with -v also hard cases."""
     for outcome in ("passed", "failed"):
         for report in terminalreporter.getreports(outcome):
             for title, table in report.user_properties:
                 if title != HARD_CASE:
                     terminalreporter.section(title)
                     terminalreporter.write_line(table)
+    stats = terminalreporter.stats # under "" are the reports of teardowns
+    failed = {report.nodeid for outcome in ("failed", "error") for report in stats.get(outcome, ())}
+    rows = rowsOf([*stats.get("", ()), *stats.get("error", ())], failed)
+    if rows and terminalreporter.verbosity > 0:
+        terminalreporter.section("hard cases")
+        for row in rows:
+            terminalreporter.write_line(described(row))
     destination = terminalreporter.config.getoption("torture_table")
     if destination:
-        writeTable(destination, terminalreporter.stats.get("", ())) # here are those of teardowns
+        keepRows(destination, rows)
+        writePage(destination)
 
 
 @pytest.fixture

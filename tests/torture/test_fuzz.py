@@ -4,17 +4,22 @@ Random scenes and random calls against the Reference platform and direct sums: w
 tests/lockstep.py, what is drawn in tests/randomscenes.py. A scene that failed once is kept by name.
 """
 import hypothesis
+import numpy as np
 import pytest
+from scipy import stats
 
+from hardcases import SPLIT_OVER
 from lockstep import Lockstep, Refused
 from platformnames import familyOf
 from randomscenes import RandomScene, randomScenes
+from scenes import FALSE_ALARM
 
 # Scenes on each family of platforms; of a device each needs programs of its own.
 SHORT = {"Reference": 25, "CPU": 72}
 LONG = {"Reference": 500, "CPU": 1400}
 SHORT_DEVICE, LONG_DEVICE = 3, 40
-MOST_REFUSED = 0.2 # of all scenes
+SHORT_CHUNKS, LONG_CHUNKS = 2, 8 # that processes share
+REFUSED = 0.1 # of all scenes, at most
 
 # Scenes that something was wrong with.
 KEPT = {
@@ -76,13 +81,26 @@ CHOSEN = {
 }
 
 
-def numberOfScenes(config, platformName):
-    asked = config.getoption("fuzz_scenes")
+def pytest_generate_tests(metafunc):
+    if SPLIT_OVER in metafunc.fixturenames:
+        chunks = LONG_CHUNKS if metafunc.config.getoption("long") else SHORT_CHUNKS
+        metafunc.parametrize(SPLIT_OVER, [f"{number}/{chunks}" for number in range(1, chunks + 1)])
+
+
+def numberOfScenes(config, platformName, chunk):
+    """Of a chunk; those of all chunks add up to what was asked for."""
     long = config.getoption("long")
-    return asked or (LONG if long else SHORT).get(familyOf(platformName), LONG_DEVICE if long else SHORT_DEVICE)
+    count = config.getoption("fuzz_scenes") or (LONG if long else SHORT).get(
+        familyOf(platformName), LONG_DEVICE if long else SHORT_DEVICE)
+    number, chunks = map(int, chunk.split("/"))
+    return count*number//chunks - count*(number - 1)//chunks
 
 
-def testRandomScenes(platformName, hardCase, request):
+def seedOf(seed, chunk):
+    return int(np.random.SeedSequence([seed, *map(int, chunk.split("/"))]).generate_state(1)[0])
+
+
+def testRandomScenes(platformName, chunk, hardCase, request):
     """
     Random scenes (1 to 60 spheres, equal, of few or of many radii up to 1:10, volume fractions from
     3e-4 to 3, any tilt, every model, boundary, split and shear protocol, Forces of all kinds, viscosities,
@@ -95,9 +113,9 @@ def testRandomScenes(platformName, hardCase, request):
     """
     refused = []
     seed = request.config.getoption("fuzz_seed")
-    count = numberOfScenes(request.config, platformName)
+    count = numberOfScenes(request.config, platformName, chunk)
 
-    @hypothesis.seed(seed)
+    @hypothesis.seed(seedOf(seed, chunk))
     @hypothesis.settings(max_examples=count, database=None, deadline=None, print_blob=False,
                          phases=(hypothesis.Phase.generate, hypothesis.Phase.shrink),
                          suppress_health_check=list(hypothesis.HealthCheck))
@@ -114,9 +132,11 @@ def testRandomScenes(platformName, hardCase, request):
             refused.append(refusal)
         hardCase.measure(**{f"{what}/allowed": ratio for what, ratio in lockstep.measured.items()})
 
-    hold()
-    hardCase.measure(seed=seed, scenes=count, refused=len(refused))
-    assert len(refused) <= MOST_REFUSED*count
+    if count > 0:
+        hold()
+    hardCase.measure(seed=seed)
+    hardCase.add(scenes=count, **{"scenes refused": len(refused)})
+    assert len(refused) <= stats.binom.isf(FALSE_ALARM, count, REFUSED)
 
 
 @pytest.mark.parametrize("name", CHOSEN)
