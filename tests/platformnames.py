@@ -85,6 +85,11 @@ def served(platformName, tolerance):
     return max(tolerance, lowestTolerance(platformName))
 
 
+def allServed(platformName, tolerances):
+    """Those of many that are not refused."""
+    return [tolerance for tolerance in tolerances if tolerance >= lowestTolerance(platformName)]
+
+
 def velocityRounding(platformName):
     """Relative rounding of a velocity that is one product, in the arithmetic of the platform."""
     return 1e-12 if not isDevice(platformName) or platformName.endswith("double") else 3e-7

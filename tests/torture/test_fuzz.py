@@ -10,7 +10,7 @@ from scipy import stats
 
 from hardcases import SPLIT_OVER
 from lockstep import Lockstep, Refused
-from platformnames import familyOf
+from platformnames import familyOf, precisionOf, served
 from randomscenes import RandomScene, randomScenes
 from scenes import FALSE_ALARM
 
@@ -111,7 +111,7 @@ def testRandomScenes(platformName, chunk, hardCase, request):
     that of the noise; the same to the bit when steps are taken one by one or repeated; nothing but finite
     numbers; else a refusal with a number and a remedy that leaves the state as it was.
     """
-    refused = []
+    refused, double = [], 0
     seed = request.config.getoption("fuzz_seed")
     count = numberOfScenes(request.config, platformName, chunk)
 
@@ -121,6 +121,8 @@ def testRandomScenes(platformName, chunk, hardCase, request):
                          suppress_health_check=list(hypothesis.HealthCheck))
     @hypothesis.given(randomScenes)
     def hold(scene):
+        nonlocal double
+        double += precisionOf(platformName, served(platformName, scene.tolerance)) == "double"
         try:
             lockstep = Lockstep(scene, platformName)
         except Refused as refusal:
@@ -135,7 +137,7 @@ def testRandomScenes(platformName, chunk, hardCase, request):
     if count > 0:
         hold()
     hardCase.measure(seed=seed)
-    hardCase.add(scenes=count, **{"scenes refused": len(refused)})
+    hardCase.add(scenes=count, **{"in double precision": double, "scenes refused": len(refused)})
     assert len(refused) <= stats.binom.isf(FALSE_ALARM, count, REFUSED)
 
 

@@ -4,20 +4,21 @@ import numpy as np
 import pytest
 
 import scenes
-from platformnames import isDirect, precisionOf, served
+from platformnames import allServed, isDirect, precisionOf
 from scenes import errorOf, forceKinds, makeContext, mobilityColumns, stored
 
 RADIUS = 0.5
 ROUNDING = {"single": 2e-5, "mixed": 2e-5, "double": 1e-10} # in eigenvalues of M/mu0
-TOLERANCES = (1e-2, 1e-5)
+TOLERANCES = (1e-2, 1e-5, 1e-7) # on CPU the last is in double precision
+NO_EIGENVALUE = 1e-13 # mu0, of rounding in an exact matrix
 TEMPERATURE = 300.0
 
 
 class Fluid:
-    """A Context at a tolerance, or at the tightest that its platform serves."""
+    """A Context at a tolerance."""
 
     def __init__(self, case, scene, platformName, tolerance):
-        self.case, self.scene, self.tolerance = case, scene, served(platformName, tolerance)
+        self.case, self.scene, self.tolerance = case, scene, tolerance
         self.rounding = ROUNDING[precisionOf(platformName, self.tolerance)]
         self.context, self.integrator = makeContext(scene, platformName, TEMPERATURE,
                                                     tolerance=self.tolerance)
@@ -35,7 +36,8 @@ class Fluid:
         assert np.linalg.norm(M - M.T, 2) < self.rounding
         smallest = np.linalg.eigvalsh(0.5*(M + M.T))[0]
         exact = np.linalg.eigvalsh(stored(self.scene, self.context).mobility/self.scene.mu0)[0]
-        self.case.least(**{"smallest eigenvalue": float(smallest), "exact": float(exact)})
+        for name, value in (("smallest eigenvalue", smallest), ("exact eigenvalue", exact)):
+            self.case.least(**{name: float(value) if abs(value) > NO_EIGENVALUE else 0.0})
         assert smallest > -self.rounding
         assert abs(smallest - exact) < 3*self.tolerance + self.rounding
 
@@ -84,13 +86,13 @@ def testAllAtOnePlace(platformName, tolerance, hardCase):
 @pytest.mark.parametrize("phi", [0.5, 1.0, 3.0])
 def testIdealGas(platformName, phi, hardCase):
     """
-    Independent uniform positions at volume fractions up to 3, tolerances 1e-2 and 1e-5.
+    Independent uniform positions at volume fractions up to 3, tolerances from 1e-2 to 1e-7.
 
     Positive to rounding; errors within the tolerance; Lanczos ends.
     """
     N = 20 if isDirect(platformName) or not hardCase.long else 60
     scene = scenes.idealGas(N, phi, scenes.cube(1), RADIUS, 701)
-    for tolerance in TOLERANCES:
+    for tolerance in allServed(platformName, TOLERANCES):
         fluid = Fluid(hardCase, scene, platformName, tolerance)
         fluid.checkPositivity()
         fluid.checkContract()
@@ -129,7 +131,6 @@ def testForcesWithinAClusterDoNotDriveIt(platformName, name, tolerance, hardCase
     force (zero for a pair).
     """
     scene = scenes.Scene(clusters()[name], scenes.cube(9.0), RADIUS)
-    tolerance = served(platformName, tolerance)
     context, integrator = makeContext(scene, platformName, tolerance=tolerance)
     here = stored(scene, context)
     for forces in (scenes.balancedForces(scene), scenes.randomForces(scene)):
