@@ -15,6 +15,7 @@ import pytest
 
 import openmmpse
 import scenes
+from platformnames import allServed, isDevice
 from scenes import makeContext, positionsOf, velocitiesOf
 
 pytestmark = pytest.mark.onePrecision
@@ -101,6 +102,104 @@ def testAForceThatThrows(platformName, hardCase):
     integrator.step(3)
     assert context.getStepCount() == before[2] + 3
     hardCase.measure(**{"steps before": before[2]})
+
+
+def sheared(integrator):
+    integrator.setShearRate(0.3)
+
+
+def freeDraining(integrator):
+    integrator.setMobilityModel(openmmpse.PSEBrownianIntegrator.FreeDraining)
+
+
+def forceCoupling(integrator):
+    integrator.setMobilityModel(openmmpse.PSEBrownianIntegrator.ForceCoupling)
+
+
+PERIODIC, UNBOUNDED = openmmpse.PSEBrownianIntegrator.Periodic, openmmpse.PSEBrownianIntegrator.Unbounded
+# Boundary, whether radii differ, tolerance, settings.
+FLUIDS = {
+    "equal spheres": (PERIODIC, False, 1e-3),
+    "equal spheres at 1e-7": (PERIODIC, False, 1e-7),
+    "mixture": (PERIODIC, True, 1e-3),
+    "sheared": (PERIODIC, False, 1e-3, sheared),
+    "sheared mixture": (PERIODIC, True, 1e-3, sheared),
+    "force coupling": (PERIODIC, False, 1e-3, forceCoupling),
+    "unbounded": (UNBOUNDED, True, 1e-3),
+    "sheared, unbounded": (UNBOUNDED, False, 1e-3, sheared),
+    "unbounded force coupling": (UNBOUNDED, True, 1e-3, forceCoupling),
+    "free draining": (PERIODIC, True, 1e-3, freeDraining),
+    "sheared, free draining": (PERIODIC, False, 1e-3, freeDraining, sheared),
+}
+ON_DEVICES = ("equal spheres", "sheared mixture", "unbounded force coupling") # each fluid needs programs of its own
+FAULTS = {"NaN": np.nan, "infinity": np.inf, "exception": None}
+
+
+class FaultyForce:
+    """A PythonForce that has the fault that is named, once."""
+
+    def __init__(self):
+        self.fault = None
+
+    def compute(self, state):
+        fault, self.fault = self.fault, None
+        if fault == "exception":
+            raise ValueError("no parameters for this bond")
+        forces = np.outer(np.ones(12), [1.0, 0.5, 0.0])
+        if fault is not None:
+            forces[7, 1] = FAULTS[fault]
+        return 0.0, forces
+
+
+def conditionOf(context, integrator):
+    """All that a step changes."""
+    state = context.getState(positions=True, velocities=True)
+    return (state.getPositions(asNumpy=True)._value, state.getVelocities(asNumpy=True)._value,
+            np.array(state.getPeriodicBoxVectors()._value), state.getTime()._value, state.getStepCount(),
+            integrator.getStrain())
+
+
+def inFluid(platformName, name):
+    """A Context, its integrator, and what makes its Force fail."""
+    boundary, differ, tolerance, *settings = FLUIDS[name]
+    box = scenes.cube(1) + [[0, 0, 0], [1e-3, 0, 0], [0, 0, 0]] # devices tilt no box that was made rectangular
+    scene = scenes.randomSuspension(12, 0.05, box, RADIUS, 741)
+    if differ:
+        scene = scenes.Scene(scene.positions, scene.box, RADIUS, np.linspace(0.6, 1.2, 12)*RADIUS)
+    force = FaultyForce()
+    context, integrator = makeContext(scene, platformName, TEMPERATURE, 0.5, tolerance, boundary=boundary,
+                                      forces=[openmm.PythonForce(force.compute)],
+                                      configure=lambda integrator: [set(integrator) for set in settings])
+    return context, integrator, force
+
+
+def testFaultsInEveryFluid(platformName, hardCase):
+    """
+    A PythonForce that returns NaN, then infinity, then raises an exception, in each kind of fluid (equal radii
+    at two tolerances, of which the tighter is in double precision, mixtures, sheared, unbounded, force coupling,
+    free draining; on devices in the short form three of them).
+
+    Each time the step is refused with the reason; positions, velocities, box, time, count and strain are those
+    before; the run goes on, to the bit, as one without faults.
+    """
+    tried = [name for name in FLUIDS if (hardCase.long or not isDevice(platformName) or name in ON_DEVICES)
+             and allServed(platformName, [FLUIDS[name][2]])]
+    for name in tried:
+        context, integrator, force = inFluid(platformName, name)
+        undisturbed, twin, _ = inFluid(platformName, name)
+        for fault in FAULTS:
+            integrator.step(2)
+            before, force.fault = conditionOf(context, integrator), fault
+            message = refusalOf(integrator.step, 1, kinds=Exception)
+            reasons = ("no parameters for this bond",) if fault == "exception" else ("force of particle 7", "not finite")
+            assert force.fault is None and all(reason in message for reason in reasons), (name, fault, message)
+            after = conditionOf(context, integrator)
+            assert all(np.array_equal(a, b) for a, b in zip(before, after)), (name, fault)
+            integrator.step(1)
+        twin.step(3*len(FAULTS))
+        assert np.array_equal(positionsOf(context), positionsOf(undisturbed)), name
+        assert np.all(np.isfinite(positionsOf(context)))
+    hardCase.measure(fluids=len(tried), refused=len(tried)*len(FAULTS))
 
 
 def testPositionsThatAreNotFinite(platformName, hardCase):
