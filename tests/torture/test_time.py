@@ -16,7 +16,7 @@ from openmmpse import PSEBrownianIntegrator
 from platformnames import isDevice, isDirect
 from polymers import NAMES, Melt, assertAgree, blocked, combined, deviation
 from scenes import FALSE_ALARM, KB, makeContext, positionsOf
-from test_contact import RADIUS, nearlyHard
+from test_contact import RADIUS, barkerHenderson, nearlyHard
 
 SMALL, LARGE = Melt(chains=4, beads=5), Melt(chains=20, beads=10)
 PRODUCT = 0.05 # of stiffness of a bond, mobility of a bead and the smaller time step
@@ -101,10 +101,7 @@ def testPressureOfNearlyHardSpheres(hardCase):
     1e-6).
     """
     steepness, reach, kT = 36, 2.4, KB*300.0
-    r = np.linspace(1e-3, reach, 100_001)
-    energy = 20*((1.9/r)**steepness - (1.9/reach)**steepness)
-    diameter = reach*np.mean(1 - np.exp(-np.minimum(energy, 700)))
-    phi = 0.2*(diameter/2)**3
+    phi = 0.2*(barkerHenderson(steepness, reach)/2)**3
     beyond = (1 + phi + phi**2 - phi**3)/(1 - phi)**3 - 1
     dilute, N = scenes.randomSuspension(60, 0.16, scenes.cube(1), RADIUS, 755), 60
     shrunk = (0.16/0.2)**(1/3)
