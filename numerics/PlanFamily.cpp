@@ -44,6 +44,10 @@ constexpr double SINGLE_ROUNDING = 3e-7, DOUBLE_ROUNDING = 1.2e-16;
 constexpr double TABLE_SHARE = 0.025; ///< share of the tolerance for tables
 /// up to which errors of tables add up to 0.1 tolerance at most where all forces are alike
 constexpr double NEIGHBOURS_ALIKE = 400;
+/// What rounding in single precision adds to that for each neighbour, relative to the mobility of a
+/// sphere, and the share of the tolerance that it may become. Small splitting parameters, and tiny
+/// boxes of many spheres, have thousands of neighbours, whose parts cancel.
+constexpr double SINGLE_PAIR_ROUNDING = 3e-9, PAIR_ROUNDING_SHARE = 0.4;
 
 /**
  * Two independent errors together. Not by std::hypot: that asks for glibc 2.35, newer than what
@@ -170,6 +174,8 @@ void PlanFamily::completeRealHalf(Plan& plan) const {
     plan.tableError = TABLE_SHARE * request.tolerance * boxShare(request) /
                       std::max(1.0, neighbours / NEIGHBOURS_ALIKE);
     const bool single = request.tolerance >= request.singleFloor &&
+                        neighbours * SINGLE_PAIR_ROUNDING <=
+                            PAIR_ROUNDING_SHARE * request.tolerance &&
                         (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
     plan.precision = (single ? Precision::Single : Precision::Double);
 }
