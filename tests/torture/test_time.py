@@ -63,7 +63,8 @@ def testEquilibrium(platformName, hardCase):
 
     Mean square bonds, radius of gyration, energy and osmotic pressure, extrapolated to no time step
     from two step sizes, are those of a Metropolis Monte Carlo of the same potential within the error
-    bars of both; all deviations together exceed them with a probability of 1e-6.
+    bars of both, and do not drift: the second half of the run agrees with the first, and so does the last third;
+    all deviations together exceed them with a probability of 1e-6.
     """
     melt, steps, fewer, interval = amountOf(platformName, hardCase.long)
     expected, starts = monteCarlo(melt, hardCase.long)
@@ -73,12 +74,32 @@ def testEquilibrium(platformName, hardCase):
     blocks = 32 if steps > 5000 else 8
     differences = {name: combined((2, blocked(fine[name], blocks)), (-1, blocked(coarse[name], blocks)),
                                   (-1, expected[name])) for name in NAMES}
+    drifts = driftsOf(fine, blocks)
+    comparisons = len(differences) + len(drifts)
+    hardCase.measure(**{"largest deviation (sigma)": assertAgree(differences, comparisons),
+                        "largest drift (sigma)": assertAgree(drifts, comparisons, "drift of")})
     for name in NAMES:
-        mean, variance, _ = differences[name]
-        hardCase.measure(**{f"{name}, error": float(mean/expected[name][0]),
-                            f"{name}, its sigma": float(np.sqrt(variance)/expected[name][0])})
-    hardCase.measure(**{"largest deviation (sigma)": assertAgree(differences, len(NAMES))})
+        tellRelative(hardCase, name, differences[name], expected[name][0])
+        tellRelative(hardCase, f"{name}, second half less first", drifts[name, "halves"], expected[name][0])
     assertPressure(melt, context, integrator)
+
+
+def driftsOf(fine, blocks):
+    """What the second half of a run has more than the first, and the last third more than the first."""
+    drifts = {}
+    for name in NAMES:
+        for label, parts in (("halves", 2), ("thirds", 3)):
+            cut = np.array_split(fine[name], parts)
+            first, last = (blocked(part, max(3, blocks//parts)) for part in (cut[0], cut[-1]))
+            drifts[name, label] = combined((1, last), (-1, first))
+    return drifts
+
+
+def tellRelative(case, name, difference, scale):
+    """A difference as above, and the smallest one that would stand out by 5 standard deviations."""
+    mean, variance, _ = difference
+    case.measure(**{f"{name}: relative error": float(mean/scale),
+                    f"{name}: would be seen from (5 sigma)": float(abs(5*np.sqrt(variance)/scale))})
 
 
 def assertPressure(melt, context, integrator):
@@ -123,7 +144,8 @@ def testPressureOfNearlyHardSpheres(hardCase):
         near = distances[distances < reach]
         virials.append(np.sum(steepness*20*(1.9/near)**steepness)/(3*N))
     mean, variance, degrees = blocked(virials, 32 if hardCase.long else 16)
-    hardCase.measure(**{"measured": float(mean), "Carnahan-Starling": float(beyond), "sigma": float(np.sqrt(variance))})
+    hardCase.measure(**{"measured": float(mean), "Carnahan-Starling": float(beyond),
+                        "relative difference would be seen from (5 sigma)": float(0.03 + 5*np.sqrt(variance)/beyond)})
     away = (max(0.0, abs(mean - beyond) - 0.03*beyond), variance, degrees)
     assert deviation(away) < scenes.stats.norm.isf(FALSE_ALARM/2)
 
@@ -165,7 +187,8 @@ def testParametersOfTheFluid(platformName, hardCase):
         label = f"tolerance {tolerance:g}, xi times {factor:g}"
         hardCase.measure(**{"largest deviation (sigma)": assertAgree(differences, comparisons, label)})
     mean, variance, _ = first["diffusion"]
-    hardCase.measure(**{"diffusion/D0": float(mean), "its sigma": float(np.sqrt(variance))})
+    hardCase.measure(**{"diffusion/D0": float(mean),
+                        "diffusion: difference would be seen from (5 sigma)": float(5*np.sqrt(2*variance)/mean)})
 
 
 def longRun(melt, start, platformName, tolerance, factor, steps, seed):
