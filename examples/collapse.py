@@ -81,7 +81,7 @@ def duration(radii, count):
 
 
 def run(options):
-    counts, chains = ([16, 32], 12) if options.short else ([30, 60, 120], 24)
+    counts, chains = ([16, 32], 40) if options.short else ([30, 60, 120], 24)
     rows, times, errors = [], {}, {}
     figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.4))
     with tqdm(desc="chains", unit=" bead steps", unit_scale=True, disable=None) as bar:

@@ -78,7 +78,7 @@ def blocked(series, blocks=20):
 
 
 def run(options):
-    numbers, times = ([0, 3], 40) if options.short else ([0, 1, 3, 10, 30, 100], 40)
+    numbers, times = ([0, 3], 60) if options.short else ([0, 1, 3, 10, 30, 100], 40)
     linear = chain(COUNT, openmm.HarmonicBondForce(), (0.0, SPRING))
     rows, found = [], []
     with tqdm(desc="steps", unit_scale=True, disable=None) as bar:

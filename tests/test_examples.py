@@ -49,6 +49,14 @@ def rowsOf(name, folder, *arguments):
     return rows
 
 
+def chanceBelow(bound, mean, scatter, seeds):
+    """
+    Probability that a positive number is below a bound, by the mean and the standard deviation of its logarithm over
+    runs with other seeds: Student's distribution of one more.
+    """
+    return stats.t.sf((mean - math.log(bound))/(scatter*math.sqrt(1 + 1/seeds)), seeds - 1)
+
+
 def testZimmAndRouse(tmp_path):
     """Each chain and each exponent; Zimm chains of 10 diffuse four times as fast as Rouse's."""
     rows = {row.quantity: row for row in rowsOf("zimm_and_rouse", tmp_path)}
@@ -60,18 +68,21 @@ def testSedimentation(tmp_path):
 
 
 def testCollapse(tmp_path):
-    """Hydrodynamic interactions make it faster: three times at N = 32, known to a fifth."""
+    """Hydrodynamic interactions make it faster; the scatter is that of 12 chains, here are 40."""
+    assert chanceBelow(1, 0.742, 0.181*math.sqrt(12/40), 20) < FALSE_ALARM
     assert rowsOf("collapse", tmp_path)[1].value > 1
 
 
 def testShearedDna(tmp_path):
-    """Flow stretches: by two thirds at Wi = 3, which is five times the error of the short form."""
+    """Flow stretches; the scatter is that of runs two thirds as long."""
+    assert chanceBelow(1, 0.685, 0.137*math.sqrt(2/3), 45) < FALSE_ALARM
     rows = {row.quantity: row.value for row in rowsOf("sheared_dna", tmp_path)}
     assert rows["DNA, Wi = 3: stretch"] > rows["DNA, Wi = 0: stretch"]
 
 
 def testGel(tmp_path):
-    """Spheres aggregate in both solvents."""
+    """Spheres aggregate in both solvents; the scatter is that of the one with fewer contacts at the end."""
+    assert chanceBelow(4, 2.334, 0.109, 20) < FALSE_ALARM
     start, *ends = rowsOf("gel", tmp_path)
     for end in (row for row in ends if row.quantity.startswith("contacts")):
         assert end.value > 4*start.value
