@@ -66,7 +66,8 @@ def testCommandRecommendsAStep(small, files, tmp_path, capsys):
     advice = accuracy.recommendStep(command.load(command._parser().parse_args(files)), bias=0.02)
     assert f"relaxes at {advice.rate:.3g} /ps, so steps must stay below {advice.stable:.3g} ps" in printed
     assert f"at 1 ps its variance is off by {advice.bias:.2g}" in printed
-    assert f"Recommended time step: {advice.recommended:.2g} ps, for a bias of 0.02" in printed
+    assert (f"Recommended time step: {advice.recommended:.2g} ps, for a variance of the stiffest mode that is 2 % too "
+            "large") in printed
     with open(tmp_path/"accuracy.csv") as file:
         assert float(next(csv.DictReader(file))["recommended_step_ps"]) == pytest.approx(advice.recommended, rel=1e-5)
     assert accuracy.main([*arguments, "0.02", "--step", str(1.5*advice.stable)]) == 0
