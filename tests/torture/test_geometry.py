@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Boxes of any shape and places anywhere: what is accurate in a cube is accurate there too."""
 import numpy as np
+import openmm
 import pytest
 from scipy.spatial import cKDTree
 
 import scenes
-from platformnames import allServed
+from platformnames import allServed, isDevice
 from scenes import errorOf, errorRatio, forceKinds, makeContext, stored
 
 RADIUS = 0.5
@@ -46,6 +47,27 @@ def testBoxes(platformName, name, hardCase):
     box = BOXES[name]
     places = np.random.default_rng(711).random((8, 3)) @ box
     check(hardCase, scenes.Scene(places, box, RADIUS), platformName)
+
+
+@pytest.mark.onePrecision
+def testCrowdInATinyBox(platformName, hardCase):
+    """
+    Thirty spheres at random places in a box of 1.3 a and a tolerance of 1e-5: each has thousands of neighbours,
+    most of them images.
+
+    Errors within the tolerance; single precision, in which they would not be, is not taken, and refused by name
+    on a device that has no other.
+    """
+    box, tolerance = scenes.cube(1.3*RADIUS), 1e-5
+    scene = scenes.Scene(np.random.default_rng(720).random((30, 3)) @ box, box, RADIUS)
+    if isDevice(platformName) and not platformName.endswith("double"):
+        with pytest.raises(openmm.OpenMMException, match="needs double precision") as caught:
+            makeContext(scene, platformName, tolerance=tolerance)
+        hardCase.measure(message=str(caught.value).partition(": ")[2])
+        return
+    _context, integrator = makeContext(scene, platformName, tolerance=tolerance)
+    assert integrator.getNumericalParameters()["precision"] == "double"
+    check(hardCase, scene, platformName, [tolerance])
 
 
 def testFacesAndCorners(platformName, hardCase):
