@@ -138,7 +138,8 @@ double MixturePlans::spreadCost(const Plan& plan) const {
                                       box.length(d));
     const bool byRows = plan.mixture->radii().size() <= WindowRows::MOST_SHAPES &&
                         plan.tableError >= WindowRows::SMALLEST_ERROR &&
-                        widest < WindowRows::MOST_POINTS && box.vectors().isDiagonal();
+                        widest < WindowRows::MOST_POINTS && box.vectors()(0, 2) == 0 &&
+                        box.vectors()(1, 2) == 0;
     double cost = 0;
     if (byRows) {
         for (int i = 0; i < composition.size(); i++) {

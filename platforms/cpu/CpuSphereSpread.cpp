@@ -86,8 +86,8 @@ template <class Real> void CpuSphereSpread<Real>::setBox(const Lattice& box) {
         const int* const extent = shapes[i].extent;
         const bool fits = *std::max_element(extent, extent + 3) <= SPHERE_LANES &&
                           size[1] >= SPHERE_LANES && mostPlaces < LARGEST_PLACE,
-                   tilted = skewY != 0 || skewX != 0 || skewZ != 0;
-        shapes[i].rowScale = (fits && !tilted ? rowScale[i] : Real(0));
+                   oblique = skewX != 0 || skewZ != 0;
+        shapes[i].rowScale = (fits && !oblique ? rowScale[i] : Real(0));
     }
 }
 

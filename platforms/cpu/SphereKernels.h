@@ -49,8 +49,9 @@ template <class Real> struct GridSpheres {
      */
     Real plane, line, point, skewY, skewX, skewZ;
     const Real* forces; ///< [n][3]
-    /// Of shapes with a rowScale, none in a tilted box or of more than SPHERE_LANES points along an
-    /// axis, nor where places in a grid are no int32_t; both [shapes][rowDegree + 1][rowTerms].
+    /// Of shapes with a rowScale, none where skewX or skewZ is not 0 or of more than SPHERE_LANES
+    /// points along an axis, nor where places in a grid are no int32_t; both
+    /// [shapes][rowDegree + 1][rowTerms].
     int rowTerms, rowDegree;
     const Real *across, *along;
     const SphereChords* chords; ///< [n]

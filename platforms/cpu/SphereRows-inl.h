@@ -32,7 +32,7 @@ HWY_INLINE void evaluateTerms(D d, const Real* HWY_RESTRICT coefficients, int de
 }
 
 /** Small integers, as many as there are lanes, from numbers and to numbers. */
-template <class D> HWY_INLINE hn::Vec<hn::Rebind<int32_t, D>> integersOf(D d, hn::Vec<D> numbers) {
+template <class D> HWY_INLINE hn::Vec<hn::Rebind<int32_t, D>> integersOf(D, hn::Vec<D> numbers) {
     const hn::Rebind<int32_t, D> di;
     if constexpr (sizeof(hn::TFromD<D>) == 4)
         return hn::ConvertTo(di, numbers);
@@ -63,7 +63,7 @@ HWY_INLINE void findChords(const GridSpheres<Real>& g, int particle,
         const auto t = hn::MulSub(hn::Mul(hn::Set(d, scale * g.plane), x), x, one),
                    left = hn::Max(hn::Sub(one, t), zero);
         const auto half = hn::Sqrt(hn::Mul(left, hn::Set(d, 1 / (scale * g.line)))),
-                   middle = hn::Set(d, -offset[1]);
+                   middle = hn::MulSub(hn::Set(d, g.skewY), x, hn::Set(d, offset[1]));
         const auto from = hn::Max(hn::Ceil(hn::Sub(middle, half)), zero),
                    to = hn::Min(hn::Floor(hn::Add(middle, half)),
                                 hn::Set(d, Real(SPHERE_LANES - 1)));
@@ -121,9 +121,9 @@ template <int TERMS, class Real> struct SphereRows {
         const Real scale = g.shapes[kind].rowScale;
         const Real* HWY_RESTRICT offset = g.offset + 3 * size_t(particle);
         const SphereChords& chords = g.chords[particle];
-        // of each plane: what it takes of t; its first row, from the centre, in the grid, and how
-        // many there are from it on before they begin again
-        Real taken[SPHERE_LANES], fromCentre[SPHERE_LANES];
+        // of each plane: what it takes of t; its first row, from the middle one of a tilted box's
+        // plane, in the grid, and how many there are from it on before they begin again
+        Real taken[SPHERE_LANES], fromMiddle[SPHERE_LANES];
         int32_t place[SPHERE_LANES], left[SPHERE_LANES];
         for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
             const hn::Rebind<int8_t, decltype(d)> bytes;
@@ -132,7 +132,8 @@ template <int TERMS, class Real> struct SphereRows {
             const auto x = lanesFrom(d, offset[0] + Real(k));
             hn::StoreU(hn::MulSub(hn::Mul(hn::Set(d, scale * g.plane), x), x, hn::Set(d, Real(1))),
                        d, taken + k);
-            hn::StoreU(hn::Add(numbersOf(d, first), hn::Set(d, offset[1])), d, fromCentre + k);
+            const auto middle = hn::MulSub(hn::Set(d, g.skewY), x, hn::Set(d, offset[1]));
+            hn::StoreU(hn::Sub(numbersOf(d, first), middle), d, fromMiddle + k);
             const auto row = hn::Add(first, hn::Set(integers, g.first[3 * size_t(particle) + 1]));
             hn::StoreU(hn::Sub(hn::Set(integers, g.size[1]), row), integers, left + k);
             hn::StoreU(hn::Add(hn::Mul(row, hn::Set(integers, static_cast<int32_t>(g.rowLength))),
@@ -145,7 +146,7 @@ template <int TERMS, class Real> struct SphereRows {
         int n = 0;
         for (; dx < end; dx++) { // each writes a vector, of which the next keeps its rows
             for (int k = 0; k < SPHERE_LANES; k += static_cast<int>(hn::Lanes(d))) {
-                const auto y = lanesFrom(d, fromCentre[dx] + Real(k));
+                const auto y = lanesFrom(d, fromMiddle[dx] + Real(k));
                 hn::StoreU(hn::MulAdd(hn::Mul(hn::Set(d, line), y), y, hn::Set(d, taken[dx])), d,
                            t + n + k);
             }
