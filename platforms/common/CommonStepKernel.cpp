@@ -105,26 +105,30 @@ std::string CommonStepKernel::precisionName() const {
 
 void CommonStepKernel::requireRoom(const Plan& plan, const Lattice& box) const {
     std::ostringstream message;
-    if (plan.precision == Precision::Double && !realIsDouble(device))
-        message << "PSEBrownianIntegrator: the tolerance " << tolerance << " with these parameters "
-                << "(predicted error " << plan.predictedError << ") needs double precision, and "
-                << "this Context computes the fluid in single precision (Precision "
-                << precisionName(plan) << "), which serves tolerances down to "
-                << SINGLE_PRECISION_FLOOR << "; set the platform property Precision to double, or "
-                << "loosen the tolerance, or leave automatic what is prescribed of the window, the "
-                << "grid and the splitting parameter";
     const double windows = 3.0 * plan.windowSupport * scene.mobile.size();
-    if (message.str().empty() && std::max(plan.gridPoints(), windows) > LARGEST_INDEX)
+    if (std::max(plan.gridPoints(), windows) > LARGEST_INDEX) {
         message << "PSEBrownianIntegrator: this scene needs " << plan.gridPoints()
                 << " grid points and " << windows << " window weights, the limit on a device is "
                 << LARGEST_INDEX
                 << " each; loosen the tolerance, choose a smaller splitting parameter, a smaller "
                    "box or fewer particles";
-    if (!message.str().empty())
         throw OpenMMException(message.str());
+    }
     // On a processor the device's memory is the machine's; of other devices OpenMM does not tell.
     if (device.getIsCPU())
         requireMemory(plan, box, scene.mobile.size(), memoryUse(plan, box));
+    if (plan.precision == Precision::Double && !realIsDouble(device)) {
+        message << "PSEBrownianIntegrator: the tolerance " << tolerance << " with these parameters "
+                << "(predicted error " << plan.predictedError << ", "
+                << meanNeighbours(plan, box, double(scene.mobile.size()))
+                << " neighbours of each particle) needs double precision, and "
+                << "this Context computes the fluid in single precision (Precision "
+                << precisionName(plan) << "), which serves tolerances down to "
+                << SINGLE_PRECISION_FLOOR << "; set the platform property Precision to double, or "
+                << "loosen the tolerance, or leave automatic what is prescribed of the window, the "
+                << "grid and the splitting parameter";
+        throw OpenMMException(message.str());
+    }
 }
 
 MemoryUse CommonStepKernel::memoryUse(const Plan& plan, const Lattice& box) const {

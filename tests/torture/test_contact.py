@@ -295,15 +295,16 @@ def testSpringsBeyondStability(platformName, fluid, hardCase):
 @pytest.mark.onePrecision
 def testSpringsThatBlowUpInTime(platformName, hardCase):
     """
-    Springs of 3 a at 1.5 times the largest stable stiffness, in equilibrium at first.
+    Springs of 3 a at 1.5 times the largest stable stiffness, in equilibrium at first: beads that pass through
+    each other keep lengths below 9 a, in a chaotic motion, until chance ends it after hundreds of steps.
 
-    An exception names a particle and the remedy, before any coordinate is beyond 1e8 nm; positions set
-    anew, the Context goes on.
+    Within 10,000 steps an exception names a particle and the remedy, before any coordinate is beyond 1e8 nm;
+    positions set anew, the Context goes on.
     """
     context, integrator, bonds, _ = dumbbells(3.0, platformName)
     start = scenes.positionsOf(context)
     with pytest.raises(openmm.OpenMMException) as caught:
-        for _ in range(200):
+        for _ in range(2000):
             integrator.step(5)
     message = str(caught.value)
     assert "particle" in message and "step size" in message, message
