@@ -12,11 +12,16 @@ namespace {
 /// what the prolate split must save, by the model of PlanCost.h, before it is preferred to a Plan
 /// without pairs and without Lanczos iterations
 constexpr double WORTH_A_REAL_HALF = 0.1;
+/// spheres up to which all may be at one place, and what the grid errs by at the worst place, cos(2
+/// pi x)
+/// + cos(2 pi y) + cos(2 pi z), over the root of its mean square: sqrt(6)
+constexpr int FEW = 100;
+constexpr double WORST_PLACE = 2.45;
 
 } // namespace
 
-AllWavesPlans::AllWavesPlans(const PlanRequest& request, bool wideWindows)
-    : PlanFamily(request, WAVE_BUDGET), wideWindows(wideWindows) {}
+AllWavesPlans::AllWavesPlans(const PlanRequest& request, bool wideWindows, bool worstPlace)
+    : PlanFamily(request, WAVE_BUDGET), wideWindows(wideWindows), worstPlace(worstPlace) {}
 
 std::vector<int> AllWavesPlans::supports() const {
     std::vector<int> all = PlanFamily::supports();
@@ -24,6 +29,10 @@ std::vector<int> AllWavesPlans::supports() const {
         for (int wider = 1; wider <= 3; wider++)
             all.push_back(std::min(all[0] + wider, LARGEST_SUPPORT));
     return all;
+}
+
+double AllWavesPlans::waveErrorOf(const Plan& plan) const {
+    return (worstPlace ? WORST_PLACE : 1) * PlanFamily::waveErrorOf(plan);
 }
 
 Plan AllWavesPlans::best() const {
@@ -61,14 +70,22 @@ Plan prolateOr(std::optional<Plan> prolate, const std::string& refusal, const Pl
     return *prolate;
 }
 
+Plan bestAllWaves(const PlanRequest& request, bool worstPlace) {
+    const Plan plan = AllWavesPlans(request, true, worstPlace).best();
+    if (plan.precision == Precision::Single || request.tolerance < request.singleFloor)
+        return plan;
+    // a wide window on a coarse grid magnifies rounding: it is no gain if it costs the precision
+    const Plan narrower = AllWavesPlans(request, false, worstPlace).best();
+    return narrower.precision == Precision::Single ? narrower : plan;
+}
+
 Plan allWavesPlan(const PlanRequest& request, const std::string& reason) {
-    Plan plan = AllWavesPlans(request, true).best();
+    Plan plan = bestAllWaves(request, request.numParticles <= FEW);
     if (plan.precision == Precision::Double && request.tolerance >= request.singleFloor) {
-        // a wide window on a coarse grid magnifies rounding: it is no gain if it costs the
-        // precision
-        const Plan narrower = AllWavesPlans(request, false).best();
-        if (narrower.precision == Precision::Single)
-            plan = narrower;
+        // near the end of single precision the mean over places has to do
+        const Plan ofMean = bestAllWaves(request, false);
+        if (ofMean.precision == Precision::Single)
+            plan = ofMean;
     }
     plan.splitReason = reason;
     return plan;

@@ -105,16 +105,21 @@ private:
 /** The one Plan of force coupling without a split. */
 class AllWavesPlans : public PlanFamily {
 public:
-    /** @param wideWindows  also those that bear coarser grids: points are what costs here */
-    AllWavesPlans(const PlanRequest& request, bool wideWindows);
+    /**
+     * @param wideWindows  also those that bear coarser grids: points are what costs here
+     * @param worstPlace   errors are those of spheres at the worst place between grid points, where
+     * all may be if they are few, not the mean over places
+     */
+    AllWavesPlans(const PlanRequest& request, bool wideWindows, bool worstPlace);
     /** @throws std::invalid_argument naming what cannot be met */
     Plan best() const;
 
 protected:
     std::vector<int> supports() const override;
+    double waveErrorOf(const Plan& plan) const override;
 
 private:
-    bool wideWindows;
+    bool wideWindows, worstPlace;
 };
 
 /**
