@@ -12,9 +12,8 @@ namespace {
 /// what the prolate split must save, by the model of PlanCost.h, before it is preferred to a Plan
 /// without pairs and without Lanczos iterations
 constexpr double WORTH_A_REAL_HALF = 0.1;
-/// spheres up to which all may be at one place, and what the grid errs by at the worst place, cos(2
-/// pi x)
-/// + cos(2 pi y) + cos(2 pi z), over the root of its mean square: sqrt(6)
+/// Spheres up to which all may be at one place. What the grid errs by is a sum of one cosine of the
+/// place along each axis: at the worst place, sqrt(6) times the root of its mean square.
 constexpr int FEW = 100;
 constexpr double WORST_PLACE = 2.45;
 

@@ -3,6 +3,7 @@
 #include "numerics/Chebyshev.h"
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 namespace PSE::numerics {
@@ -88,10 +89,11 @@ WaveWeight fitWaveWeight(const std::function<double(double)>& share,
     for (; fit.pieces <= MOST_PIECES; fit.pieces *= 2)
         if (fitPieces(weight, errors, fit))
             return fit;
-    throw std::invalid_argument(
-        "the wave factors of a box that moves need more than " + std::to_string(MOST_PIECES) +
-        " pieces of polynomials for an error of " + std::to_string(errors.allowed) +
-        "; use the prolate split, or a looser error tolerance");
+    std::ostringstream message;
+    message << "the wave factors of a box that moves need more than " << MOST_PIECES
+            << " pieces of polynomials for an error of " << errors.allowed
+            << "; use the prolate split, or a looser error tolerance";
+    throw std::invalid_argument(message.str());
 }
 
 } // namespace PSE::numerics

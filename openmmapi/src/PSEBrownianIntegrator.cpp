@@ -80,8 +80,7 @@ unsigned long long counter(const string& text) {
     return std::stoull(text);
 }
 
-/** While it lives, nobody else may use the Context: no other thread, and no Force that is computed.
- */
+/** While it lives, nobody else may use the Context: no other thread, no Force that is computed. */
 class Exclusive {
 public:
     Exclusive(std::atomic<bool>& inUse, const char* method) : inUse(inUse) {
