@@ -15,7 +15,7 @@ namespace {
 constexpr double ROOT_SHARE = 0.01, FINEST_ROOT = 1e-14;
 /// A ratio of changes below this part of the last two is no sign of convergence; for so many
 /// iterations.
-constexpr double OUT_OF_LINE = 0.2;
+constexpr double OUT_OF_LINE = 0.5;
 constexpr int DISTRUSTED = 3;
 /// So often a result may be doubted: in single precision changes never fall in line.
 constexpr int MOST_DOUBTS = 8;

@@ -85,6 +85,31 @@ private:
 };
 
 /**
+ * Take out of a vector what it has of all basis vectors, classical Gram-Schmidt: one pass over the
+ * basis finds all overlaps, another removes them. Where that takes more than half of it, what is
+ * left has overlaps of its own by rounding, and both are done once more; twice is enough (Daniel,
+ * Gragg, Kaufman and Stewart 1976). Where a three-term recurrence has just removed all that it can,
+ * once nearly always is.
+ * @param norms   of the basis vectors
+ * @param square  that of the vector
+ * @return the square of what is left
+ */
+template <class Space>
+double orthogonalise(Space& space, const std::vector<double>& norms, typename Space::Vector& vector,
+                     double square) {
+    for (int pass = 0; pass < 2; pass++) {
+        const double before = square;
+        std::vector<double> overlaps = space.dots(static_cast<int>(norms.size()), vector);
+        for (size_t i = 0; i < norms.size(); i++)
+            overlaps[i] /= -norms[i] * norms[i];
+        square = space.addCombination(overlaps, vector);
+        if (square > 0.5 * before)
+            break;
+    }
+    return square;
+}
+
+/**
  * Compute result = M^{1/2} z. Basis vector i is basis(i) over its norm; Space supplies
  *
  *     using Vector = ...;      a vector of the platform, contents kept where they are
@@ -92,8 +117,11 @@ private:
  *     double multiplyAdd(const Vector& v, double s, const Vector& w, double t, Vector& out);
  *                              out = s M v + t w; returns v . out
  *     double addScaled(double s, const Vector& v, Vector& out);   out += s v; returns out . out
- *     double dot(const Vector& v, const Vector& w);
- *     void combine(const std::vector<double>& c, Vector& out);    out = sum of c_i basis(i)
+ *     std::vector<double> dots(int count, const Vector& v);
+ *                              v . basis(i) for i < count
+ *     double addCombination(const std::vector<double>& c, Vector& out);
+ *                              out += sum of c_i basis(i); returns out . out
+ *     void clear(Vector& out); out = 0, of the size of a basis vector
  *
  * with sums accumulated in double.
  *
@@ -105,11 +133,10 @@ private:
 template <class Space>
 int lanczosSquareRoot(Space& space, typename Space::Vector& result, LanczosTridiagonal small,
                       bool reorthogonalise) {
-    std::vector<double> norms = {std::sqrt(space.dot(space.basis(0), space.basis(0)))};
-    if (norms[0] == 0) {
-        space.combine({0}, result);
+    space.clear(result);
+    std::vector<double> norms = {std::sqrt(space.dots(1, space.basis(0))[0])};
+    if (norms[0] == 0)
         return 0;
-    }
     for (int i = 0;; i++) {
         typename Space::Vector &current = space.basis(i), &next = space.basis(i + 1);
         // The norm of the next vector is the off-diagonal entry beta: next = M v_i - beta v_{i-1}.
@@ -119,9 +146,7 @@ int lanczosSquareRoot(Space& space, typename Space::Vector& result, LanczosTridi
         const double alpha = overlap / norms[i];
         double square = space.addScaled(-alpha / norms[i], current, next);
         if (reorthogonalise)
-            for (int j = i; j >= 0; j--)
-                square = space.addScaled(-space.dot(space.basis(j), next) / (norms[j] * norms[j]),
-                                         space.basis(j), next);
+            square = orthogonalise(space, norms, next, square);
         const double beta = std::sqrt(square);
         if (small.add(alpha, beta))
             break;
@@ -130,7 +155,7 @@ int lanczosSquareRoot(Space& space, typename Space::Vector& result, LanczosTridi
     std::vector<double> coefficients;
     for (int i = 0; i < small.iterations(); i++)
         coefficients.push_back(norms[0] * small.coefficients()[i] / norms[i]);
-    space.combine(coefficients, result);
+    space.addCombination(coefficients, result);
     return small.iterations();
 }
 template <class Space>

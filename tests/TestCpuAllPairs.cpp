@@ -49,8 +49,8 @@ template <class Real>
 std::vector<double> product(const UnboundedPlan& plan, const std::vector<double>& radii,
                             const std::vector<Vec3>& x, double& difference) {
     OpenMM::ThreadPool pool(2);
-    const Threads threads(pool, false), oneThread(pool, true);
-    CpuAllPairs<Real> pairs(plan, radii, threads, oneThread);
+    const Threads threads(pool, false);
+    CpuAllPairs<Real> pairs(plan, radii, threads);
     pairs.setPositions(x);
     pairs.expectMore(true);
     auto &v = pairs.basis(0), &first = pairs.basis(1), &second = pairs.basis(2);

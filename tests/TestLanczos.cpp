@@ -30,16 +30,22 @@ struct DenseSpace {
         products++;
         return v.dot(out);
     }
-    double dot(const Vector& v, const Vector& w) { return v.dot(w); }
+    std::vector<double> dots(int count, const Vector& v) {
+        std::vector<double> all;
+        for (int i = 0; i < count; i++)
+            all.push_back(v.dot(storage[i]));
+        return all;
+    }
     double addScaled(double s, const Vector& v, Vector& out) {
         out += s * v;
         return out.squaredNorm();
     }
-    void combine(const std::vector<double>& c, Vector& out) {
-        out = VectorXd::Zero(M.rows());
+    double addCombination(const std::vector<double>& c, Vector& out) {
         for (size_t i = 0; i < c.size(); i++)
             out += c[i] * storage[i];
+        return out.squaredNorm();
     }
+    void clear(Vector& out) { out = VectorXd::Zero(M.rows()); }
 
     MatrixXd M;
     std::vector<VectorXd> storage;
@@ -362,21 +368,28 @@ double errorOfWhole(const MatrixXd& M, double tolerance, double negativeToleranc
 } // namespace
 
 // Many eigenvalues, three of each, that fall fast: the process finds them group by group, and seems
-// to stand still in between.
+// to stand still in between. Ten tolerances are the most that is seen, and more than six are rare.
 TEST(Lanczos, UnequalSpheresAtOnePlaceKeepTheToleranceWithinAFactor) {
     const int n = 46;
-    const VectorXd radii = (1.386 * randomVector(n, 5).array().sin()).exp(); // from 1/4 to 4
-    MatrixXd rigid(3 * n, 3 * n), gaussian(3 * n, 3 * n);
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            const double larger = std::max(radii[i], radii[j]);
-            const double both = std::hypot(radii[i], radii[j]) / std::sqrt(2.0);
-            rigid.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / larger;
-            gaussian.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / both;
-        }
-    for (const MatrixXd& M : {rigid, gaussian})
-        for (double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6})
-            for (unsigned seed : {1, 2, 3})
-                EXPECT_LE(errorOfWhole(M, tolerance, 1e-12, seed), 6 * tolerance)
-                    << tolerance << " " << seed;
+    int beyondSix = 0;
+    for (unsigned spheres : {5, 6, 7, 8, 9}) {
+        const VectorXd radii =
+            (1.386 * randomVector(n, spheres).array().sin()).exp(); // from 1/4 to 4
+        MatrixXd rigid(3 * n, 3 * n), gaussian(3 * n, 3 * n);
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++) {
+                const double larger = std::max(radii[i], radii[j]);
+                const double both = std::hypot(radii[i], radii[j]) / std::sqrt(2.0);
+                rigid.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / larger;
+                gaussian.block(3 * i, 3 * j, 3, 3) = Eigen::Matrix3d::Identity() / both;
+            }
+        for (const MatrixXd& M : {rigid, gaussian})
+            for (double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6})
+                for (unsigned seed : {1, 2, 3, 4, 5, 6}) {
+                    const double error = errorOfWhole(M, tolerance, 1e-12, seed) / tolerance;
+                    EXPECT_LE(error, 10) << tolerance << " " << spheres << " " << seed;
+                    beyondSix += error > 6;
+                }
+    }
+    EXPECT_LE(beyondSix, 3); // of 300
 }

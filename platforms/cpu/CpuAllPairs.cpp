@@ -27,8 +27,8 @@ template <class Real> int CpuAllPairs<Real>::slabsFor(int particles) {
 
 template <class Real>
 CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<double>& radii,
-                               const Threads& threads, const Threads& oneThread)
-    : KrylovVectors<Real>(oneThread), threads(threads), a(plan.a),
+                               const Threads& threads)
+    : KrylovVectors<Real>(threads), a(plan.a),
       farthestNear(2 * ROUNDING_SHARE * plan.lanczosTolerance /
                    std::numeric_limits<Real>::epsilon()),
       count(static_cast<int>(radii.size())),
@@ -118,7 +118,7 @@ double CpuAllPairs<Real>::multiplyAdd(const Vector& v, double s, const Vector& w
              keeps ? records[slab].data() : nullptr);
     });
     recorded = keeps;
-    return this->sumOverTasks(threads, [&](int from, int to, int) {
+    return this->sumOverTasks([&](int from, int to, int) {
         return addSlabs(from, std::min(to, count), v, s, w, t, out);
     });
 }

@@ -31,13 +31,9 @@ public:
     /// beside the record of pairs
     static constexpr double BYTES_PER_PARTICLE = (3 * MOST_SLABS + 8) * sizeof(Real);
 
-    /**
-     * @param radii      of the particles (nm)
-     * @param threads    for products
-     * @param oneThread  for vectors: beside products their operations are too short to wake others
-     */
+    /** @param radii  of the particles (nm) */
     CpuAllPairs(const numerics::UnboundedPlan& plan, const std::vector<double>& radii,
-                const Threads& threads, const Threads& oneThread);
+                const Threads& threads);
     /** @param x  positions (nm) */
     void setPositions(const std::vector<numerics::Vec3>& x);
     int stride() const { return padded; }
@@ -53,8 +49,8 @@ private:
                     Vector& out) const;
 
     using KrylovVectors<Real>::kernels;
+    using KrylovVectors<Real>::threads;
 
-    const Threads& threads;
     double a;
     double farthestNear; ///< from the middle, in a: there the rests of coordinates may be left out
     int count, padded;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "CpuEngine.h"
-#include "ForceUnit.h"
 #include "ParticleOrder.h"
 #include "numerics/Lanczos.h"
 #include <algorithm>
@@ -13,7 +12,7 @@ namespace PSE {
 namespace {
 
 /// particles and grid points below which waking threads costs more than they do
-constexpr double SERIAL_WORK = 20000;
+constexpr double SERIAL_WORK = 15000;
 
 bool isSmall(const Plan& plan, size_t particles) {
     return 10.0 * particles + plan.gridPoints() < SERIAL_WORK;
@@ -66,12 +65,18 @@ template <class Real>
 void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const Thermal* thermal,
                                         std::vector<Vec3>& u) {
     const ForceUnit scale(forces, thermal, drag);
-    const double unit = scale.unit;
-    if (unit == 0) {
+    if (scale.unit == 0) {
         u.assign(indices.size(), Vec3::Zero());
         return;
     }
     u.resize(indices.size());
+    threads.keepAwake([&] { setVelocities(scale, forces, thermal, u); });
+}
+
+template <class Real>
+void CpuEngine<Real>::setVelocities(const ForceUnit& scale, const std::vector<Vec3>* forces,
+                                    const Thermal* thermal, std::vector<Vec3>& u) {
+    const double unit = scale.unit;
     clock.start();
     const bool forced = scale.forced;
     const Real noise = Real(scale.noise);

@@ -4,6 +4,7 @@
 
 #include "CpuRealSpace.h"
 #include "CpuWaveSpace.h"
+#include "ForceUnit.h"
 #include "MobilityEngine.h"
 #include <optional>
 
@@ -26,6 +27,8 @@ public:
 
 private:
     using Vector = AlignedVector<Real>;
+    void setVelocities(const ForceUnit& scale, const std::vector<numerics::Vec3>* forces,
+                       const Thermal* thermal, std::vector<numerics::Vec3>& u);
     void takeForces(const std::vector<numerics::Vec3>& forces, double unit);
     void multiplyReal(const std::vector<numerics::Vec3>& forces, double unit);
     void drawReal(const Thermal& thermal);

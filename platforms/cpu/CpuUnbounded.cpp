@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "CpuUnbounded.h"
-#include "ForceUnit.h"
 #include "numerics/Lanczos.h"
 #include <cmath>
 
@@ -10,7 +9,7 @@ namespace PSE {
 
 namespace {
 /// particles below which waking threads costs more than they do
-constexpr size_t FEW_PARTICLES = 250;
+constexpr size_t FEW_PARTICLES = 200;
 } // namespace
 
 template <class Real>
@@ -18,8 +17,7 @@ CpuUnbounded<Real>::CpuUnbounded(const UnboundedPlan& plan, const std::vector<do
                                  double viscosity, const std::vector<int>& indices,
                                  OpenMM::ThreadPool& pool, StageClock& clock)
     : plan(plan), drag(6 * M_PI * viscosity * plan.a), indices(indices),
-      threads(pool, indices.size() < FEW_PARTICLES), oneThread(pool, true), clock(clock),
-      pairs(plan, radii, threads, oneThread) {
+      threads(pool, indices.size() < FEW_PARTICLES), clock(clock), pairs(plan, radii, threads) {
     forced.assign(3 * size_t(pairs.stride()), Real(0));
     random = forced;
 }
@@ -35,6 +33,12 @@ void CpuUnbounded<Real>::computeVelocities(const std::vector<Vec3>* forces, cons
     u.assign(indices.size(), Vec3::Zero());
     if (scale.unit == 0)
         return;
+    threads.keepAwake([&] { addVelocities(scale, forces, thermal, u); });
+}
+
+template <class Real>
+void CpuUnbounded<Real>::addVelocities(const ForceUnit& scale, const std::vector<Vec3>* forces,
+                                       const Thermal* thermal, std::vector<Vec3>& u) {
     clock.start();
     pairs.expectMore(scale.noise > 0);
     if (scale.forced) {

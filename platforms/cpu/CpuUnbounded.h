@@ -3,6 +3,7 @@
 #define OPENMMPSE_CPUUNBOUNDED_H_
 
 #include "CpuAllPairs.h"
+#include "ForceUnit.h"
 #include "MobilityEngine.h"
 #include "WaveKernels.h"
 
@@ -29,13 +30,15 @@ public:
 
 private:
     using Vector = AlignedVector<Real>;
+    void addVelocities(const ForceUnit& scale, const std::vector<numerics::Vec3>* forces,
+                       const Thermal* thermal, std::vector<numerics::Vec3>& u);
     void multiply(const std::vector<numerics::Vec3>& forces, double unit);
     void drawNoise(const Thermal& thermal);
 
     numerics::UnboundedPlan plan;
     double drag; ///< 6 pi eta a
     std::vector<int> indices;
-    Threads threads, oneThread;
+    Threads threads;
     StageClock& clock;
     CpuAllPairs<Real> pairs;
     WaveKernels<Real> noiseLoops = waveKernels<Real>();

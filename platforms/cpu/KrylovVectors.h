@@ -5,8 +5,8 @@
 #include "AlignedVector.h"
 #include "PairKernels.h"
 #include "Threads.h"
-#include <algorithm>
 #include <deque>
+#include <numeric>
 #include <vector>
 
 namespace PSE {
@@ -29,40 +29,46 @@ public:
         krylov[i].resize(3 * size_t(count) + 1);
         return krylov[i];
     }
-    double dot(const Vector& v, const Vector& w) const {
-        return sumOverTasks([&](int from, int to, int) {
-            return kernels.dot(3 * (to - from), v.data() + 3 * size_t(from),
-                               w.data() + 3 * size_t(from));
+    std::vector<double> dots(int number, const Vector& v) const {
+        std::vector<double> all(number, 0.0);
+        partials.resize(size_t(number) * Threads::blocks(count));
+        threads.runBlocks(count, [&](int from, int to, int task) {
+            for (int k = 0; k < number; k++) // while this part of v is near
+                partials[size_t(task) * number + k] =
+                    kernels.dot(3 * (to - from), v.data() + 3 * size_t(from),
+                                krylov[k].data() + 3 * size_t(from));
         });
+        for (size_t i = 0; i < partials.size(); i++)
+            all[i % number] += partials[i];
+        return all;
     }
     double addScaled(double s, const Vector& v, Vector& out) const {
         return sumOverTasks([&](int from, int to, int) {
-            return kernels.addScaled(3 * (to - from), Real(s), v.data() + 3 * size_t(from),
-                                     out.data() + 3 * size_t(from));
+            const int n = 3 * (to - from);
+            Real* const part = out.data() + 3 * size_t(from);
+            kernels.addScaled(n, Real(s), v.data() + 3 * size_t(from), part);
+            return kernels.dot(n, part, part);
         });
     }
-    void combine(const std::vector<double>& coefficients, Vector& out) const {
-        threads.runBlocks(count, [&](int from, int to, int) {
-            std::fill(out.begin() + 3 * size_t(from), out.begin() + 3 * size_t(to), Real(0));
+    double addCombination(const std::vector<double>& coefficients, Vector& out) const {
+        return sumOverTasks([&](int from, int to, int) {
+            const int n = 3 * (to - from);
+            Real* const part = out.data() + 3 * size_t(from);
             for (size_t k = 0; k < coefficients.size(); k++)
-                for (size_t i = 3 * size_t(from); i < 3 * size_t(to); i++)
-                    out[i] += Real(coefficients[k]) * krylov[k][i];
+                kernels.addScaled(n, Real(coefficients[k]), krylov[k].data() + 3 * size_t(from),
+                                  part);
+            return kernels.dot(n, part, part);
         });
     }
+    void clear(Vector& out) const { out.assign(krylov[0].size(), Real(0)); }
 
 protected:
     /** The sum of what work(from, to, task) returns, in the order of the tasks. */
     template <class Work> double sumOverTasks(Work work) const {
-        return sumOverTasks(threads, work);
-    }
-    template <class Work> double sumOverTasks(const Threads& workers, Work work) const {
-        partial.resize(Threads::blocks(count));
-        workers.runBlocks(
-            count, [&](int from, int to, int task) { partial[task] = work(from, to, task); });
-        double total = 0;
-        for (double sum : partial)
-            total += sum;
-        return total;
+        partials.resize(Threads::blocks(count));
+        threads.runBlocks(
+            count, [&](int from, int to, int task) { partials[task] = work(from, to, task); });
+        return std::accumulate(partials.begin(), partials.end(), 0.0);
     }
 
     const Threads& threads;
@@ -71,7 +77,7 @@ protected:
 private:
     int count = 0;
     std::deque<Vector> krylov; // references to earlier vectors stay valid while it grows
-    mutable std::vector<double> partial;
+    mutable std::vector<double> partials;
 };
 
 } // namespace PSE

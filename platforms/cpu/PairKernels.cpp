@@ -128,10 +128,9 @@ template <class Real> double dotAny(int n, const Real* HWY_RESTRICT v, const Rea
 }
 
 template <class Real>
-double addScaledAny(int n, Real s, const Real* HWY_RESTRICT v, Real* HWY_RESTRICT out) {
+void addScaledAny(int n, Real s, const Real* HWY_RESTRICT v, Real* HWY_RESTRICT out) {
     for (int i = 0; i < n; i++)
         out[i] += s * v[i];
-    return dotAny(n, out, out);
 }
 
 #if HWY_TARGET == HWY_SCALAR

@@ -104,8 +104,8 @@ template <class Real> struct PairKernels {
      */
     double (*multiplyRows)(const PairRows<Real>& rows, int from, int to, const Real* v, Real s,
                            const Real* w, Real t, Real* out);
-    /** out += s v for n numbers. @return sum of out^2 */
-    double (*addScaled)(int n, Real s, const Real* v, Real* out);
+    /** out += s v for n numbers. */
+    void (*addScaled)(int n, Real s, const Real* v, Real* out);
     /** Sum of v w over n numbers. */
     double (*dot)(int n, const Real* v, const Real* w);
 };

@@ -2,8 +2,8 @@
 #ifndef OPENMMPSE_THREADS_H_
 #define OPENMMPSE_THREADS_H_
 
+#include "TaskShare.h"
 #include "openmm/internal/ThreadPool.h"
-#include <atomic>
 #include <exception>
 #include <mutex>
 
@@ -21,7 +21,9 @@ public:
         : pool(pool), serial(serial || pool.getNumThreads() < 2) {}
     int count() const { return serial ? 1 : pool.getNumThreads(); }
 
-    /** Call work(task, thread) once for each task in [0, tasks); the first exception is passed on.
+    /**
+     * Call work(task, thread) once for each task in [0, tasks), and return when all are done; the
+     * first exception is passed on. The calling thread is thread 0 and takes tasks, too.
      */
     template <class Work> void run(int tasks, Work work) const {
         if (serial || tasks < 2) {
@@ -29,20 +31,46 @@ public:
                 work(task, 0);
             return;
         }
-        std::atomic<int> next(0);
         std::exception_ptr error;
         std::once_flag first;
-        pool.execute([&](OpenMM::ThreadPool&, int thread) {
+        const auto guarded = [&](int task, int thread) {
             try {
-                for (int task = next++; task < tasks; task = next++)
-                    work(task, thread);
+                work(task, thread);
             } catch (...) {
                 std::call_once(first, [&] { error = std::current_exception(); });
             }
-        });
-        pool.waitForThreads();
+        };
+        keepAwake([&] { share->run(tasks, guarded); });
         if (error)
             std::rethrow_exception(error);
+    }
+
+    /**
+     * Call body(). Until it returns the other threads wait for the tasks of run() without going to
+     * sleep: a run() then takes about a microsecond besides its tasks, not the waking of threads,
+     * which is many times that. For many short runs one after another; a body that is long between
+     * them keeps the other threads busy with nothing. The pool must have no other use meanwhile.
+     */
+    template <class Body> void keepAwake(Body body) const {
+        if (serial || share != nullptr) {
+            body();
+            return;
+        }
+        TaskShare mine;
+        pool.execute([&mine](OpenMM::ThreadPool&, int thread) {
+            if (thread > 0) // the calling thread stands for thread 0
+                mine.serve(thread);
+        });
+        share = &mine;
+        const struct End { // by an exception, too
+            const Threads& threads;
+            ~End() {
+                threads.share->end();
+                threads.share = nullptr;
+                threads.pool.waitForThreads();
+            }
+        } end = {*this};
+        body();
     }
 
     /** Call work(from, to, block) for blocks of a fixed size that cover [0, n). */
@@ -58,6 +86,7 @@ public:
 private:
     OpenMM::ThreadPool& pool;
     bool serial;
+    mutable TaskShare* share = nullptr; ///< while threads are kept awake
 };
 
 } // namespace PSE

@@ -27,24 +27,32 @@ public:
             out[i] = s * out[i] + t * w[i];
         return dot(v, out);
     }
-    double dot(const Vector& v, const Vector& w) const {
-        double sum = 0;
-        for (size_t i = 0; i < v.size(); i++)
-            sum += v[i].dot(w[i]);
-        return sum;
+    std::vector<double> dots(int count, const Vector& v) const {
+        std::vector<double> all;
+        for (int k = 0; k < count; k++)
+            all.push_back(dot(v, vectors[k]));
+        return all;
     }
     double addScaled(double s, const Vector& v, Vector& out) const {
         for (size_t i = 0; i < v.size(); i++)
             out[i] += s * v[i];
         return dot(out, out);
     }
-    void combine(const std::vector<double>& coefficients, Vector& out) const {
-        out.assign(particles, numerics::Vec3::Zero());
+    double addCombination(const std::vector<double>& coefficients, Vector& out) const {
         for (size_t k = 0; k < coefficients.size(); k++)
             addScaled(coefficients[k], vectors[k], out);
+        return dot(out, out);
     }
+    void clear(Vector& out) const { out.assign(particles, numerics::Vec3::Zero()); }
 
 private:
+    static double dot(const Vector& v, const Vector& w) {
+        double sum = 0;
+        for (size_t i = 0; i < v.size(); i++)
+            sum += v[i].dot(w[i]);
+        return sum;
+    }
+
     size_t particles;
     Multiply multiply;
     std::deque<Vector> vectors; // references to earlier vectors stay valid while it grows
