@@ -166,9 +166,10 @@ HWY_INLINE void addPairs(D d, const Law& law, const AllPairs<Real>& p, const Row
 }
 
 /**
- * Rows at once: what is loaded and stored of a column serves all. Four need the registers of 32.
+ * Rows at once: what is loaded and stored of a column serves all. Four need 32 registers; with 16
+ * even two have their own sums and places in memory, and one is faster.
  */
-constexpr int ROWS = (HWY_TARGET <= HWY_AVX3 || !HWY_ARCH_X86 ? 4 : 2);
+constexpr int ROWS = (HWY_TARGET <= HWY_AVX3 || !HWY_ARCH_X86 ? 4 : 1);
 static_assert(ALL_PAIRS_ROWS % ROWS == 0);
 /// Bytes of columns at a time: with the rows they stay in the nearest cache.
 constexpr int TILE_BYTES = 2048;
@@ -183,8 +184,8 @@ HWY_INLINE Real* addRowsOfTile(D d, const AllPairs<Real>& p, int i, int begin, i
     const int lanes = static_cast<int>(hn::Lanes(d));
     const size_t y = p.stride, z = 2 * size_t(p.stride);
     const Law law;
-    const Row<Real> row1(p, i, v), row2(p, i + 1, v), row3(p, i + ROWS - 2, v),
-        row4(p, i + ROWS - 1, v);
+    const auto rowAt = [&](int n) { return Row<Real>(p, n < ROWS ? i + n : i, v); };
+    const Row<Real> row1 = rowAt(0), row2 = rowAt(1), row3 = rowAt(2), row4 = rowAt(3);
     V u1x = hn::Zero(d), u1y = u1x, u1z = u1x, u2x = u1x, u2y = u1x, u2z = u1x, u3x = u1x,
       u3y = u1x, u3z = u1x, u4x = u1x, u4y = u1x, u4z = u1x;
     const auto column = [&](auto diagonal, int j) HWY_ATTR {
@@ -195,9 +196,9 @@ HWY_INLINE Real* addRowsOfTile(D d, const AllPairs<Real>& p, int i, int begin, i
           wz = hn::LoadU(d, sums + z + j);
         addPairs<DIAGONAL, SCALARS>(d, law, p, row1, j, vx, vy, vz, u1x, u1y, u1z, wx, wy, wz,
                                     record);
-        addPairs<DIAGONAL, SCALARS>(d, law, p, row2, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz,
-                                    record + 2 * lanes);
         if constexpr (ROWS == 4) {
+            addPairs<DIAGONAL, SCALARS>(d, law, p, row2, j, vx, vy, vz, u2x, u2y, u2z, wx, wy, wz,
+                                        record + 2 * lanes);
             addPairs<DIAGONAL, SCALARS>(d, law, p, row3, j, vx, vy, vz, u3x, u3y, u3z, wx, wy, wz,
                                         record + 4 * lanes);
             addPairs<DIAGONAL, SCALARS>(d, law, p, row4, j, vx, vy, vz, u4x, u4y, u4z, wx, wy, wz,
@@ -220,8 +221,8 @@ HWY_INLINE Real* addRowsOfTile(D d, const AllPairs<Real>& p, int i, int begin, i
         sums[z + row] += hn::GetLane(hn::SumOfLanes(d, uz));
     };
     add(i, u1x, u1y, u1z);
-    add(i + 1, u2x, u2y, u2z);
     if constexpr (ROWS == 4) {
+        add(i + 1, u2x, u2y, u2z);
         add(i + 2, u3x, u3y, u3z);
         add(i + 3, u4x, u4y, u4z);
     }

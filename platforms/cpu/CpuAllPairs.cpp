@@ -58,12 +58,12 @@ CpuAllPairs<Real>::CpuAllPairs(const UnboundedPlan& plan, const std::vector<doub
     mayRecord = bytes <= MOST_RECORDED;
 }
 
-/** Slabs of about as many pairs each, starting at multiples of ALL_PAIRS_LANES. */
+/** Slabs of about as many pairs each, starting at multiples of ALL_PAIRS_ROWS. */
 template <class Real> void CpuAllPairs<Real>::divideRows() {
     const int slabs = static_cast<int>(sums.size());
     for (int slab = 0; slab < slabs; slab++) {
         const double before = count * (1 - std::sqrt(1 - double(slab) / slabs));
-        const int row = static_cast<int>(before) / ALL_PAIRS_LANES * ALL_PAIRS_LANES;
+        const int row = static_cast<int>(before) / ALL_PAIRS_ROWS * ALL_PAIRS_ROWS;
         firstRow.push_back(row);
     }
     firstRow.push_back(count);
