@@ -12,15 +12,11 @@ namespace {
 /// what the prolate split must save, by the model of PlanCost.h, before it is preferred to a Plan
 /// without pairs and without Lanczos iterations
 constexpr double WORTH_A_REAL_HALF = 0.1;
-/// Spheres up to which all may be at one place. What the grid errs by is a sum of one cosine of the
-/// place along each axis: at the worst place, sqrt(6) times the root of its mean square.
-constexpr int FEW = 100;
-constexpr double WORST_PLACE = 2.45;
 
 } // namespace
 
-AllWavesPlans::AllWavesPlans(const PlanRequest& request, bool wideWindows, bool worstPlace)
-    : PlanFamily(request, WAVE_BUDGET), wideWindows(wideWindows), worstPlace(worstPlace) {}
+AllWavesPlans::AllWavesPlans(const PlanRequest& request, bool wideWindows, Places places)
+    : PlanFamily(request, WAVE_BUDGET, places), wideWindows(wideWindows) {}
 
 std::vector<int> AllWavesPlans::supports() const {
     std::vector<int> all = PlanFamily::supports();
@@ -28,10 +24,6 @@ std::vector<int> AllWavesPlans::supports() const {
         for (int wider = 1; wider <= 3; wider++)
             all.push_back(std::min(all[0] + wider, LARGEST_SUPPORT));
     return all;
-}
-
-double AllWavesPlans::waveErrorOf(const Plan& plan) const {
-    return (worstPlace ? WORST_PLACE : 1) * PlanFamily::waveErrorOf(plan);
 }
 
 Plan AllWavesPlans::best() const {
@@ -69,22 +61,14 @@ Plan prolateOr(std::optional<Plan> prolate, const std::string& refusal, const Pl
     return *prolate;
 }
 
-Plan bestAllWaves(const PlanRequest& request, bool worstPlace) {
-    const Plan plan = AllWavesPlans(request, true, worstPlace).best();
-    if (plan.precision == Precision::Single || request.tolerance < request.singleFloor)
-        return plan;
-    // a wide window on a coarse grid magnifies rounding: it is no gain if it costs the precision
-    const Plan narrower = AllWavesPlans(request, false, worstPlace).best();
-    return narrower.precision == Precision::Single ? narrower : plan;
-}
-
-Plan allWavesPlan(const PlanRequest& request, const std::string& reason) {
-    Plan plan = bestAllWaves(request, request.numParticles <= FEW);
+Plan allWavesPlan(const PlanRequest& request, Places places, const std::string& reason) {
+    Plan plan = AllWavesPlans(request, true, places).best();
     if (plan.precision == Precision::Double && request.tolerance >= request.singleFloor) {
-        // near the end of single precision the mean over places has to do
-        const Plan ofMean = bestAllWaves(request, false);
-        if (ofMean.precision == Precision::Single)
-            plan = ofMean;
+        // a wide window on a coarse grid magnifies rounding: it is no gain if it costs the
+        // precision
+        const Plan narrower = AllWavesPlans(request, false, places).best();
+        if (narrower.precision == Precision::Single)
+            plan = narrower;
     }
     plan.splitReason = reason;
     return plan;
@@ -92,15 +76,15 @@ Plan allWavesPlan(const PlanRequest& request, const std::string& reason) {
 
 } // namespace
 
-Plan makeForceCouplingPlan(const PlanRequest& request) {
+Plan makeForceCouplingPlan(const PlanRequest& request, Places places) {
     if (request.split == SplitChoice::Hasimoto)
         throw std::invalid_argument(
             "Hasimoto's split is one of the Rotne-Prager-Yamakawa mobility, and the mobility model "
             "is ForceCoupling; use setSplit(AutomaticSplit), setSplit(Prolate) or "
             "setSplit(AllWaves)");
     if (request.split == SplitChoice::AllWaves)
-        return allWavesPlan(request, "as prescribed");
-    const ProlatePlans family(request);
+        return allWavesPlan(request, places, "as prescribed");
+    const ProlatePlans family(request, places);
     std::string obstacle;
     std::optional<Plan> prolate = family.best(obstacle);
     if (request.split == SplitChoice::Prolate)
@@ -113,15 +97,16 @@ Plan makeForceCouplingPlan(const PlanRequest& request) {
                          obstacle + ", or leave splitting parameter, cutoff and bandwidth 0",
                          request, "because its range is prescribed");
     if (!prolate)
-        return allWavesPlan(request, "because " + obstacle);
+        return allWavesPlan(request, places, "because " + obstacle);
     checkPlan(*prolate, request);
     const bool keeps = prolate->predictedError <= request.tolerance;
     prolate->splitReason = "because the cost model finds neighbours and a coarse grid cheaper here "
                            "than waves alone";
     Plan whole;
     try {
-        whole = allWavesPlan(request, "because the cost model finds waves alone cheaper here than "
-                                      "neighbours and a coarser grid");
+        whole = allWavesPlan(request, places,
+                             "because the cost model finds waves alone cheaper here than "
+                             "neighbours and a coarser grid");
     } catch (const std::invalid_argument&) {
         if (!keeps)
             throw;

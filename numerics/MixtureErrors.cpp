@@ -17,6 +17,8 @@ constexpr double SPHERES = 4 * M_PI / 3;
 /// Of the local volume fraction, for each kind of sphere alone: in a cluster of its like the
 /// velocities of the others, too, are what an error is relative to.
 constexpr double CLUSTER_SHARE = 1.0 / 3;
+/// up to which images of one place are summed one by one; integrals serve for more
+constexpr double MOST_IMAGES = 3000;
 
 double shareOutside(const std::array<double, 3>& faces, double k) {
     double outside = 0;
@@ -102,8 +104,8 @@ public:
 };
 
 MixtureErrors::MixtureErrors(const Composition& composition, const Lattice& box, double phi,
-                             double extent)
-    : composition(composition), box(box), damping(missingModes(box, extent)) {
+                             double extent, Places places)
+    : composition(composition), box(box), damping(missingModes(box, extent)), places(places) {
     const int n = composition.size();
     radii = Eigen::Map<const Eigen::ArrayXd>(composition.radii.data(), n);
     mean = Eigen::Map<const Eigen::ArrayXd>(composition.counts.data(), n) / box.volume();
@@ -117,7 +119,20 @@ MixtureErrors::MixtureErrors(const Composition& composition, const Lattice& box,
 
 MixtureErrors::Parts MixtureErrors::none() const {
     const int n = composition.size();
-    return {Eigen::MatrixXd::Zero(n, n), Eigen::ArrayXd::Zero(n)};
+    const int m = (places == Places::Together ? n : 0);
+    return {Eigen::MatrixXd::Zero(n, n), Eigen::ArrayXd::Zero(n), Eigen::MatrixXd::Zero(m, m)};
+}
+
+double MixtureErrors::atOnePlace(const Eigen::MatrixXd& errors, int j) const {
+    // like forces on all n of the kind move everything there, or each what it would move alone
+    const double n = composition.counts[j];
+    double velocities = 0, wrong = 0;
+    for (int i = 0; i < composition.size(); i++) {
+        const double mobility = mobilityAmongImages(box, radii[i], radii[j]);
+        velocities += composition.counts[i] * mobility * mobility;
+        wrong += composition.counts[i] * errors(i, j) * errors(i, j);
+    }
+    return wrong / std::max(radii[j] * radii[j] * velocities, 1 / n);
 }
 
 double MixtureErrors::worst(const Parts& parts) const {
@@ -125,7 +140,8 @@ double MixtureErrors::worst(const Parts& parts) const {
     for (int j = 0; j < composition.size(); j++) {
         const Eigen::ArrayXd pairs = parts.pairs.col(j).array();
         const double around = std::max((dense * pairs).sum(), (alone * pairs).maxCoeff());
-        largest = std::max(largest, radii[j] * std::sqrt(around + parts.self[j]));
+        const double there = (places == Places::Together ? atOnePlace(parts.together, j) : 0);
+        largest = std::max(largest, radii[j] * std::sqrt(around + parts.self[j] + there));
     }
     return largest;
 }
@@ -149,26 +165,45 @@ double MixtureErrors::dropped(const ProlateEnvelope& envelope) const {
 double MixtureErrors::realTruncation(const Mixture& mixture) const {
     constexpr int NODES = 24;
     constexpr double PERIODS = 4; // of the shortest waves: what is left beyond falls fast
-    const double end = mixture.largestWaveNumber(), further = PERIODS * 2 * M_PI / end;
-    const MixtureQuadrature waves(mixture, mixture.largestRange() + further);
+    const double end = mixture.largestWaveNumber(), further = PERIODS * 2 * M_PI / end,
+                 farthest = mixture.largestRange() + further;
+    const MixtureQuadrature waves(mixture, farthest);
     Parts parts = none();
     Eigen::MatrixXd alike = parts.pairs;
+    std::vector<Vec3> images;
+    if (places == Places::Together && box.imageCandidates(farthest) <= MOST_IMAGES)
+        images = box.imagesWithin(farthest);
     for (int i = 0; i < composition.size(); i++)
         for (int j = 0; j <= i; j++) {
             const double ai = radii[i], aj = radii[j], from = mixture.range(ai, aj);
             const Quadrature rule = gaussLegendre(NODES, from, from + further);
             const std::vector<double> pair = waves.of(ai, aj);
+            const auto left = [&](double r) {
+                const PairScalars rpy = rpyScalars(r, ai, aj);
+                const SmoothScalars wave = waves.at(r, pair);
+                return PairScalars{rpy.F - wave.F, rpy.G - wave.F - wave.C * r * r};
+            };
             double random = 0, coherent = 0;
             for (int q = 0; q < NODES; q++) {
                 const double r = rule.nodes[q], shell = 4 * M_PI * r * r * rule.weights[q];
-                const PairScalars rpy = rpyScalars(r, ai, aj);
-                const SmoothScalars wave = waves.at(r, pair);
-                const double F = rpy.F - wave.F, G = rpy.G - wave.F - wave.C * r * r;
-                random += shell * (2 * F * F + G * G) / 3;
-                coherent += shell * (2 * F + G) / 3;
+                const PairScalars rest = left(r);
+                random += shell * (2 * rest.F * rest.F + rest.G * rest.G) / 3;
+                coherent += shell * (2 * rest.F + rest.G) / 3;
             }
             parts.pairs(i, j) = parts.pairs(j, i) = random;
             alike(i, j) = alike(j, i) = std::fabs(coherent);
+            if (images.empty())
+                continue;
+            Matrix3 sum = Matrix3::Zero(); // over the images of one place
+            for (const Vec3& image : images) {
+                const double r = image.norm();
+                if (r <= from || r > from + further)
+                    continue;
+                const PairScalars rest = left(r);
+                sum += rest.F * Matrix3::Identity() +
+                       (rest.G - rest.F) / (r * r) * image * image.transpose();
+            }
+            parts.together(i, j) = parts.together(j, i) = sum.colwise().norm().maxCoeff();
         }
     parts.self = (alike.transpose() * mean.matrix()).array().square();
     return worst(parts);
@@ -190,16 +225,23 @@ void MixtureErrors::addOutside(const Mixture& mixture, const Cell& cell, const R
             PROJECTION * FACTOR * FACTOR * share * H * H / (k * k) * squares * squares.transpose();
         lost += PROJECTION * FACTOR * share * H * squares.array();
     }
-    parts.self += lost.square();
+    if (places == Places::Together)
+        parts.together += (lost.sqrt().matrix() * lost.sqrt().matrix().transpose());
+    else
+        parts.self += lost.square();
 }
 
 void MixtureErrors::addAliases(const Mixture& mixture, const Cell& cell, const RadialWindow& window,
                                Parts& parts) const {
     const int n = composition.size();
+    const bool together = (places == Places::Together);
+    const size_t numAliases = cell.aliases.size();
     const double end = std::min(mixture.largestWaveNumber(), window.band());
     Eigen::ArrayXd bias = Eigen::ArrayXd::Zero(n);
     // what the self mobility ripples with along each reciprocal vector of the grid: 4 R cos(G.x)
-    std::vector<Matrix3> ripple(cell.aliases.size() * n, Matrix3::Zero());
+    std::vector<Matrix3> ripple(numAliases * n, Matrix3::Zero());
+    // and the mobility of two at one place, a third of the trace
+    std::vector<Eigen::MatrixXd> mutual(together ? numAliases : 0, Eigen::MatrixXd::Zero(n, n));
     for (size_t q = 0; q < cell.k.size(); q++) {
         const Vec3& k = cell.k[q];
         const double k2 = k.squaredNorm(), norm = std::sqrt(k2);
@@ -210,22 +252,34 @@ void MixtureErrors::addAliases(const Mixture& mixture, const Cell& cell, const R
         const Eigen::ArrayXd s = sincs(norm, radii);
         const Matrix3 transverse = Matrix3::Identity() - k * k.transpose() / k2;
         Eigen::ArrayXd aliases = Eigen::ArrayXd::Zero(n);
-        for (size_t g = 0; g < cell.aliases.size(); g++) {
+        for (size_t g = 0; g < numAliases; g++) {
             const double up = (k + cell.aliases[g]).norm(), down = (k - cell.aliases[g]).norm();
             const Eigen::ArrayXd first = own * window.transform(up) * sincs(up, radii),
                                  second = own * window.transform(down) * sincs(down, radii);
             aliases += first.square() + second.square();
-            for (int i = 0; i < n; i++)
-                ripple[g * n + i] +=
-                    0.5 * cell.weight[q] * full * s[i] * (first[i] + second[i]) * transverse;
+            if (together)
+                mutual[g] += 2.0 / 3 * 0.5 * cell.weight[q] * full * s.matrix() *
+                             (first + second).matrix().transpose();
+            else
+                for (int i = 0; i < n; i++)
+                    ripple[g * n + i] +=
+                        0.5 * cell.weight[q] * full * s[i] * (first[i] + second[i]) * transverse;
         }
         const Eigen::VectorXd one = s.square(), more = aliases;
         parts.pairs += 2.0 / 3 * cell.weight[q] * b * b *
                        (one * more.transpose() + more * one.transpose() + more * more.transpose());
         bias += 2.0 / 3 * cell.weight[q] * full * aliases;
     }
+    if (together) {
+        // Of different radii the mean of the one spread and the other gathered, and the reverse;
+        // their bias is at most the geometric mean.
+        for (const Eigen::MatrixXd& R : mutual)
+            parts.together += 2 * (R + R.transpose()).cwiseAbs();
+        parts.together += bias.sqrt().matrix() * bias.sqrt().matrix().transpose();
+        return;
+    }
     parts.self += bias.square();
-    for (size_t g = 0; g < cell.aliases.size(); g++)
+    for (size_t g = 0; g < numAliases; g++)
         for (int i = 0; i < n; i++)
             parts.self[i] += 8 * ripple[g * n + i].squaredNorm() / 3;
 }

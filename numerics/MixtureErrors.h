@@ -25,6 +25,18 @@ struct Composition {
     double volume() const;
 };
 
+/** What estimates of errors know of the places of spheres between grid points. */
+enum class Places {
+    Spread,  ///< as many at each: the mean square counts
+    Together ///< all may be at one, and that the worst
+};
+
+/**
+ * Mobility of a sphere of radius a for a force on one of radius b at its place, or on itself, among
+ * all images, 1/(6 pi eta) [T14]; at least a tenth of that without images.
+ */
+double mobilityAmongImages(const Lattice& box, double a, double b);
+
 /**
  * Root mean square errors of M f for a mixture [T27]. One force of random direction on one particle
  * makes errors in the velocities of all; each estimate is the largest, over all radii, of their
@@ -40,7 +52,8 @@ public:
      * in a cluster of its like; at least that of the box counts
      * @param extent  pairs farther apart are left out of the estimate of the grid
      */
-    MixtureErrors(const Composition& composition, const Lattice& box, double phi, double extent);
+    MixtureErrors(const Composition& composition, const Lattice& box, double phi, double extent,
+                  Places places = Places::Spread);
 
     /**
      * What a prolate envelope of the bandwidth drops beyond its end, in pairs; an upper bound,
@@ -64,11 +77,17 @@ private:
     struct Parts {
         Eigen::MatrixXd pairs; ///< (other kind, kind of the force)
         Eigen::ArrayXd self;
+        Eigen::MatrixXd together; ///< no squares: of two at the worst place; empty if spread
     };
     class Cell;
 
     Parts none() const;
     double worst(const Parts& parts) const;
+    /**
+     * Square of the error of all at one place for forces on kind j, relative to what they do, in
+     * the unit of Parts::self.
+     */
+    double atOnePlace(const Eigen::MatrixXd& errors, int j) const;
     void addOutside(const Mixture& mixture, const Cell& cell, const RadialWindow* window,
                     Parts& parts) const;
     void addAliases(const Mixture& mixture, const Cell& cell, const RadialWindow& window,
@@ -77,6 +96,7 @@ private:
     Composition composition;
     Lattice box;
     double damping;
+    Places places;
     Eigen::ArrayXd radii, mean, dense, alone; ///< number densities
 };
 

@@ -57,12 +57,13 @@ std::vector<double> inUnits(const std::vector<double>& radii, double unit) {
 
 } // namespace
 
-MixturePlans::MixturePlans(const PlanRequest& request)
-    : PlanFamily(request, BUDGET), composition(inUnits(request.radii, request.radius)),
+MixturePlans::MixturePlans(const PlanRequest& request, Places places)
+    : PlanFamily(request, BUDGET, places), composition(inUnits(request.radii, request.radius)),
       radii(inUnits(request.radii, request.radius)),
       errors(composition, box, phi,
-             std::min(extent, LARGEST_EXTENT *
-                                  std::cbrt(composition.volume() / composition.particles()))) {}
+             std::min(extent,
+                      LARGEST_EXTENT * std::cbrt(composition.volume() / composition.particles())),
+             places) {}
 
 double MixturePlans::unitRadius(const std::vector<double>& radii) {
     double squares = 0;
@@ -87,12 +88,6 @@ double MixturePlans::realErrorOf(const Plan& plan) const {
 
 Magnification MixturePlans::magnificationOf(const Plan& plan) const {
     return errors.magnification(*plan.mixture, plan.grid, windowOf(plan));
-}
-
-std::vector<int> MixturePlans::supports() const {
-    if (request.overrides.windowSupport > 0)
-        return {request.overrides.windowSupport};
-    return {supportFor(error), supportFor(error) - 1};
 }
 
 double MixturePlans::shapeOf(int support) const {

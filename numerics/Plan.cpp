@@ -4,6 +4,7 @@
 #include "numerics/Window.h"
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
@@ -144,8 +145,12 @@ namespace {
  */
 constexpr double WORTH_A_CHANGE = 0.05;
 
-Plan hasimotoPlan(const PlanRequest& request, const std::string& reason) {
-    Plan plan = HasimotoPlans(request).best();
+/// Spheres up to which all may be at one place, and that the worst between grid points; of more, as
+/// many are taken to be at each. Plans of so few cost little, whatever their grid.
+constexpr int FEW = 100;
+
+Plan hasimotoPlan(const PlanRequest& request, Places places, const std::string& reason) {
+    Plan plan = HasimotoPlans(request, places).best();
     plan.splitReason = reason;
     return plan;
 }
@@ -160,25 +165,27 @@ bool isMixture(const std::vector<double>& radii) {
     return std::any_of(radii.begin(), radii.end(), [&](double a) { return a != radii[0]; });
 }
 
-Plan makePlan(const PlanRequest& request) {
+namespace {
+
+Plan planFor(const PlanRequest& request, Places places) {
     if (isMixture(request.radii)) {
         PlanRequest mixed = request;
         mixed.radius = MixturePlans::unitRadius(request.radii);
         checkRequest(mixed);
-        const Plan plan = MixturePlans(mixed).best();
+        const Plan plan = MixturePlans(mixed, places).best();
         checkPlan(plan, mixed);
         return plan;
     }
     checkRequest(request);
     if (request.model == SphereModel::ForceCoupling)
-        return makeForceCouplingPlan(request);
+        return makeForceCouplingPlan(request, places);
     if (request.split == SplitChoice::AllWaves)
         throw std::invalid_argument(
             "the waves of the Rotne-Prager-Yamakawa mobility decay too slowly to do without a "
             "real half; use setSplit(AutomaticSplit), or setMobilityModel(ForceCoupling)");
     if (request.split == SplitChoice::Hasimoto)
-        return hasimotoPlan(request, "as prescribed");
-    const ProlatePlans family(request);
+        return hasimotoPlan(request, places, "as prescribed");
+    const ProlatePlans family(request, places);
     std::string obstacle;
     std::optional<Plan> prolate = family.best(obstacle);
     if (prolate)
@@ -189,7 +196,7 @@ Plan makePlan(const PlanRequest& request) {
                 obstacle + ", or another split, setSplit(AutomaticSplit) or setSplit(Hasimoto)");
         prolate->splitReason = "as prescribed";
     } else if (!prolate)
-        return hasimotoPlan(request, "because " + obstacle);
+        return hasimotoPlan(request, places, "because " + obstacle);
     checkPlan(*prolate, request);
     if (request.split == SplitChoice::Prolate ||
         (isPrescribed(request.overrides) && prolate->predictedError <= request.tolerance))
@@ -197,8 +204,9 @@ Plan makePlan(const PlanRequest& request) {
     const bool keeps = prolate->predictedError <= request.tolerance;
     Plan other;
     try {
-        other = hasimotoPlan(request, "because the cost model finds it cheaper here than the "
-                                      "prolate split, which would be valid");
+        other = hasimotoPlan(request, places,
+                             "because the cost model finds it cheaper here than the "
+                             "prolate split, which would be valid");
     } catch (const std::invalid_argument&) {
         if (!keeps)
             throw;
@@ -213,6 +221,33 @@ Plan makePlan(const PlanRequest& request) {
     const bool cheaper =
         !other.sumImages && family.cost(other) < (1 - WORTH_A_CHANGE) * family.cost(*prolate);
     return cheaper && (!keeps || other.predictedError <= request.tolerance) ? other : *prolate;
+}
+
+std::optional<Plan> planForWorstPlace(const PlanRequest& request) {
+    try {
+        return planFor(request, Places::Together);
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;
+    }
+}
+
+} // namespace
+
+Plan makePlan(const PlanRequest& request) {
+    // a sum over modes has no grid that places could matter for
+    if (request.numParticles > FEW || request.directSums)
+        return planFor(request, Places::Spread);
+    const std::optional<Plan> worst = planForWorstPlace(request);
+    const bool singleDoes = request.tolerance >= request.singleFloor;
+    if (worst && worst->predictedError <= request.tolerance &&
+        (worst->precision == Precision::Single || !singleDoes))
+        return *worst;
+    // Near the ends of single and double precision, and on a grid that is prescribed, the mean over
+    // places has to do.
+    const Plan mean = planFor(request, Places::Spread);
+    const bool better = mean.predictedError <= request.tolerance &&
+                        (mean.precision == Precision::Single || !singleDoes);
+    return better || !worst ? mean : *worst;
 }
 
 } // namespace PSE::numerics

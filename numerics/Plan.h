@@ -83,7 +83,9 @@ struct Plan {
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
     double windowError;      ///< absolute error allowed in the weights of the window
-    double predictedError;   ///< rms error of M f for unit random forces, 1/(6 pi eta a)
+    /// rms error of M f for unit random forces, 1/(6 pi eta a); of few spheres with what the grid
+    /// errs by at its worst place, where all may be
+    double predictedError;
     Precision precision;
     /// made for a box that moves: wave factors are made anew, fast, for each shape of it
     bool moving = false;
@@ -103,7 +105,8 @@ bool isMixture(const std::vector<double>& radii);
 /**
  * Choose all parameters so that the predicted error for unit random forces at volume fraction
  * max(phi, 0.3) keeps the tolerance (with Hasimoto's split each half at most tolerance/2), at the
- * lowest cost by the model of PlanCost.h.
+ * lowest cost by the model of PlanCost.h. Few spheres keep it where all are at one place, too, the
+ * worst between grid points, unless that would cost the precision.
  * @throws std::invalid_argument naming what cannot be met
  */
 Plan makePlan(const PlanRequest& request);
@@ -124,12 +127,14 @@ int nextFftSize(int n);
  * Root mean square error of the wave half on a grid, for unit random forces at volume fraction phi,
  * in 1/(6 pi eta a): aliases of the window in pairs and in the self mobility, and the modes beyond
  * Nyquist [T14].
- * @param box     in radii
- * @param extent  pairs farther apart (in radii) are left out of the estimate; default: none
+ * @param box       in radii
+ * @param extent    pairs farther apart (in radii) are left out of the estimate; default: none
+ * @param together  the self mobility errs as at the worst place between grid points, relative to
+ * this mobility, 1/(6 pi eta a), of spheres that may all be there; 0: as in the mean over places
  */
 double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
                  int windowSupport, double windowShape, double phi,
-                 double extent = std::numeric_limits<double>::infinity());
+                 double extent = std::numeric_limits<double>::infinity(), double together = 0);
 
 /**
  * What the wave half makes of small relative errors e of weights and of numbers on the grid: an

@@ -27,6 +27,12 @@ constexpr double TINY_BOX = 6, TINY_BOX_SHARE = 0.4;
 constexpr double LARGEST_EXTENT = 12;
 constexpr double LONG_BOX = 2;  ///< longest over shortest box vector
 constexpr int MORE_SUPPORT = 4; ///< than the rule, at most
+/// sqrt(6): what the self mobility errs by at the worst place between grid points, a sum of one
+/// cosine along each axis, over the root of its mean square
+constexpr double WORST_PLACE = 2.45;
+/// of the window's shape to its support, there: with more, aliases of the main lobe and of the edge
+/// may cancel in the estimate, and do not at every place
+constexpr double LARGEST_RATIO = 2.35;
 /// the other end of the grids that are tried, see FINEST, and how closely the best is sought
 constexpr double COARSEST = 0.85, GRID_PRECISION = 0.004;
 constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
@@ -122,14 +128,27 @@ double narrowestWidth(const PlanRequest& r) {
     return r.shortest * r.box.smallestWidth();
 }
 
-PlanFamily::PlanFamily(const PlanRequest& request, double share)
+PlanFamily::PlanFamily(const PlanRequest& request, double share, Places places)
     : request(request), box(scaledBox(request)),
       error(share * request.tolerance * boxShare(request)), meanPhi(volumeFraction(request)),
-      phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)), extent(extentOf(request, phi)) {}
+      phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)), extent(extentOf(request, phi)),
+      places(places) {}
+
+double PlanFamily::together() const {
+    if (places == Places::Spread)
+        return 0;
+    // N spheres at one place move N times as fast as one by its force: an error is relative to
+    // that, or to what each would do alone
+    return std::max(1.0 / request.numParticles, mobilityAmongImages(box, 1, 1));
+}
+
+double PlanFamily::windowError() const {
+    return places == Places::Spread ? error : error * together() / WORST_PLACE;
+}
 
 double PlanFamily::waveErrorOf(const Plan& plan) const {
-    return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi,
-                     extent);
+    return waveError(*plan.split, box, plan.grid, plan.windowSupport, plan.windowShape, phi, extent,
+                     together());
 }
 
 std::array<int, 3> PlanFamily::gridFor(double nyquist, int support) const {
@@ -173,10 +192,10 @@ void PlanFamily::completeRealHalf(Plan& plan) const {
     const double neighbours = meanNeighbours(request.box, request.numParticles, plan.realCutoff);
     plan.tableError = TABLE_SHARE * request.tolerance * boxShare(request) /
                       std::max(1.0, neighbours / NEIGHBOURS_ALIKE);
-    const bool single = request.tolerance >= request.singleFloor &&
-                        neighbours * SINGLE_PAIR_ROUNDING <=
-                            PAIR_ROUNDING_SHARE * request.tolerance &&
-                        (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
+    const bool single =
+        request.tolerance >= request.singleFloor &&
+        neighbours * SINGLE_PAIR_ROUNDING <= PAIR_ROUNDING_SHARE * request.tolerance &&
+        (plan.mixture || plan.realCutoff / plan.a <= plan.split->tableRange(true));
     plan.precision = (single ? Precision::Single : Precision::Double);
 }
 
@@ -207,13 +226,15 @@ void PlanFamily::predict(Plan& plan, double wave) const {
 }
 
 double PlanFamily::shapeOf(int support) const {
-    return shapeFor(error, support);
+    const double shape = shapeFor(windowError(), support);
+    return places == Places::Spread ? shape : std::min(shape, LARGEST_RATIO * support);
 }
 
 std::vector<int> PlanFamily::supports() const {
     if (request.overrides.windowSupport > 0)
         return {request.overrides.windowSupport};
-    return {supportFor(error), supportFor(error) - 1};
+    const int usual = supportFor(windowError());
+    return {usual, usual - 1};
 }
 
 bool PlanFamily::fitGrid(Plan& plan, double unit, double& wave) const {
@@ -271,7 +292,10 @@ Plan PlanFamily::finished(const Plan& plan, double unit) const {
         if (request.overrides.windowShape == 0)
             candidate.windowShape = shapeOf(candidates[i]);
         double wave = 0;
-        const bool fit = fitGrid(candidate, unit, wave);
+        // no grid mends what a window makes of rounding
+        const bool fit = fitGrid(candidate, unit, wave) &&
+                         magnificationOf(candidate).of(SMALLEST_WINDOW_ERROR) <=
+                             ROUNDING_SHARE * request.tolerance;
         if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {
             best = candidate;
             bestWave = wave;
@@ -290,7 +314,8 @@ std::string PlanFamily::windowRefusal(const Plan& plan, double wave) const {
     return message.str();
 }
 
-HasimotoPlans::HasimotoPlans(const PlanRequest& request) : PlanFamily(request, BUDGET_PER_HALF) {
+HasimotoPlans::HasimotoPlans(const PlanRequest& request, Places places)
+    : PlanFamily(request, BUDGET_PER_HALF, places) {
     if (narrowestWidth(request) / request.radius < TINY_BOX)
         error *= TINY_BOX_SHARE;
 }

@@ -35,7 +35,7 @@ void checkPlan(const Plan& plan, const PlanRequest& request);
 /** Whether the caller has left so little open that the splits cannot be compared. */
 bool isPrescribed(const PlanOverrides& wish);
 /** makePlan() for force coupling [T44]. */
-Plan makeForceCouplingPlan(const PlanRequest& request);
+Plan makeForceCouplingPlan(const PlanRequest& request, Places places);
 
 /** What the families share; lengths in radii inside. */
 class PlanFamily {
@@ -48,7 +48,7 @@ public:
 
 protected:
     /** @param share  of the tolerance that the wave half may use */
-    PlanFamily(const PlanRequest& request, double share);
+    PlanFamily(const PlanRequest& request, double share, Places places);
     virtual double waveErrorOf(const Plan& plan) const;
     /** With M_R, in a step. */
     double products() const;
@@ -78,8 +78,13 @@ protected:
     /// error allowed to the wave half, 1/(6 pi eta a)
     double error;
     double meanPhi, phi, extent;
+    Places places;
 
 private:
+    /** What an error at one place is relative to, as waveError() takes it. */
+    double together() const;
+    /** The error that windows are made for: `error`, or what may be the mean over places then. */
+    double windowError() const;
     /** The smallest grid that keeps the budget by the full estimate; false if there is none. */
     bool fitGrid(Plan& plan, double unit, double& wave) const;
 };
@@ -87,7 +92,7 @@ private:
 /** Plans with Hasimoto's split, by xi: each half may use half of the tolerance. */
 class HasimotoPlans : public PlanFamily {
 public:
-    explicit HasimotoPlans(const PlanRequest& request);
+    HasimotoPlans(const PlanRequest& request, Places places);
     Plan best() const;
 
 private:
@@ -107,19 +112,16 @@ class AllWavesPlans : public PlanFamily {
 public:
     /**
      * @param wideWindows  also those that bear coarser grids: points are what costs here
-     * @param worstPlace   errors are those of spheres at the worst place between grid points, where
-     * all may be if they are few, not the mean over places
      */
-    AllWavesPlans(const PlanRequest& request, bool wideWindows, bool worstPlace);
+    AllWavesPlans(const PlanRequest& request, bool wideWindows, Places places);
     /** @throws std::invalid_argument naming what cannot be met */
     Plan best() const;
 
 protected:
     std::vector<int> supports() const override;
-    double waveErrorOf(const Plan& plan) const override;
 
 private:
-    bool wideWindows, worstPlace;
+    bool wideWindows;
 };
 
 /**
@@ -128,7 +130,7 @@ private:
  */
 class ProlatePlans : public PlanFamily {
 public:
-    explicit ProlatePlans(const PlanRequest& request);
+    ProlatePlans(const PlanRequest& request, Places places);
     /**
      * The cheapest.
      * @param obstacle  why there is none, and what would help; "" otherwise
@@ -159,7 +161,7 @@ public:
     /**
      * @param request  with radii, and unitRadius() of them as radius
      */
-    explicit MixturePlans(const PlanRequest& request);
+    MixturePlans(const PlanRequest& request, Places places);
     /** 1/sqrt(mean of 1/a_i^2): unit forces have mobilities of 1 in units of 1/(6 pi eta a). */
     static double unitRadius(const std::vector<double>& radii);
     /**
@@ -173,7 +175,6 @@ protected:
     double waveErrorOf(const Plan& plan) const override;
     double realErrorOf(const Plan& plan) const override;
     Magnification magnificationOf(const Plan& plan) const override;
-    std::vector<int> supports() const override;
     double shapeOf(int support) const override;
 
 private:

@@ -48,7 +48,8 @@ double resolvedRange(const PlanRequest& request) {
 
 } // namespace
 
-ProlatePlans::ProlatePlans(const PlanRequest& request) : PlanFamily(request, WAVE_BUDGET) {}
+ProlatePlans::ProlatePlans(const PlanRequest& request, Places places)
+    : PlanFamily(request, WAVE_BUDGET, places) {}
 
 std::optional<double> ProlatePlans::bandwidthFor(double R) const {
     if (request.overrides.bandwidth > 0)

@@ -38,6 +38,16 @@ double inverseFourthPowers(const Lattice& box) {
     return sum;
 }
 
+/** The window's transform p periods above each node, relative to that there, p = 1, 2, ... */
+std::vector<std::vector<double>> neighbours(const Window& window, const Quadrature& rule,
+                                            int periods) {
+    std::vector<std::vector<double>> all(periods);
+    for (int p = 1; p <= periods; p++)
+        for (double theta : rule.nodes)
+            all[p - 1].push_back(window.transform(theta + 2 * M_PI * p) / window.transform(theta));
+    return all;
+}
+
 } // namespace
 
 Quadrature gradedBand(int nodes) {
@@ -57,15 +67,18 @@ double missingModes(const Lattice& box, double extent) {
 }
 
 double waveError(const Split& split, const Lattice& box, const std::array<int, 3>& grid,
-                 int windowSupport, double windowShape, double phi, double extent) {
+                 int windowSupport, double windowShape, double phi, double extent,
+                 double together) {
     constexpr int NODES = 24;
     const Quadrature rule = gradedBand(NODES);
     const Window window(windowSupport, windowShape);
-    std::vector<double> aliasing(NODES), neighbour(NODES);
-    for (int i = 0; i < NODES; i++) {
+    // Where the edge of the window is what limits it, aliases from farther away count, too: they
+    // fall as 1/p.
+    const int periods = (together > 0 ? 8 : 1);
+    const std::vector<std::vector<double>> neighbour = neighbours(window, rule, periods);
+    std::vector<double> aliasing(NODES);
+    for (int i = 0; i < NODES; i++)
         aliasing[i] = window.aliasing(rule.nodes[i]);
-        neighbour[i] = window.transform(rule.nodes[i] + 2 * M_PI) / window.transform(rule.nodes[i]);
-    }
     Matrix3 waves = box.waveVectors() / (2 * M_PI);
     std::array<double, 3> faces;
     for (int d = 0; d < 3; d++) {
@@ -79,7 +92,8 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
     const double damping = missingModes(box, extent);
     const double density = 3 * phi / (4 * M_PI);
     double pairs = 0, bias = 0;
-    Matrix3 ripple = Matrix3::Zero();   // (direction of the ripple, component of the force)
+    // of each period: (direction of the ripple, component of the force)
+    std::vector<Matrix3> ripple(periods, Matrix3::Zero());
     for (int i = 0; i < NODES / 2; i++) // w(-k) = w(k): one half, twice
         for (int j = 0; j < NODES; j++)
             for (int l = 0; l < NODES; l++) {
@@ -95,16 +109,34 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
                 const int node[3] = {i, j, l},
                           mirror[3] = {NODES - 1 - i, NODES - 1 - j, NODES - 1 - l};
                 const Vec3 transverse = Vec3::Ones() - k.cwiseProduct(k) / k2;
-                for (int d = 0; d < 3; d++)
-                    ripple.row(d) += 0.5 * weight * full *
-                                     (neighbour[node[d]] + neighbour[mirror[d]]) *
-                                     transverse.transpose();
+                for (int p = 0; p < periods; p++)
+                    for (int d = 0; d < 3; d++)
+                        ripple[p].row(d) += 0.5 * weight * full *
+                                            (neighbour[p][node[d]] + neighbour[p][mirror[d]]) *
+                                            transverse.transpose();
             }
-    // A particle at x feels a ripple 4 R_d cos(2 pi x_d/h_d) in its self mobility: mean square 8
-    // R_d^2.
-    const double self = 8 * ripple.squaredNorm() / 3 + std::pow(2 * bias / 3, 2);
+    // A particle at x feels a ripple 4 R_d cos(2 pi x_d/h_d) in its self mobility, of mean square 8
+    // R_d^2. At the worst place all cosines have one sign, and what is lost adds up with them.
+    const double lost = (together > 0 ? split.bandTruncation(faces, 0) : 0);
+    double worst = 2 * bias / 3 + lost;
+    for (const Matrix3& R : ripple)
+        worst += 4 * R.cwiseAbs().sum() / 3;
+    const double self = together > 0 ? std::pow(worst / together, 2)
+                                     : 8 * ripple[0].squaredNorm() / 3 + std::pow(2 * bias / 3, 2);
     const double truncation = split.bandTruncation(faces, phi);
-    return std::sqrt(density * 2 / 3 * pairs + self + truncation * truncation);
+    return std::sqrt(density * 2 / 3 * pairs + self + truncation * truncation - lost * lost);
+}
+
+double mobilityAmongImages(const Lattice& box, double a, double b) {
+    constexpr double CUBIC = 2.8373; // of a cube, whose edge the shortest vector is taken for
+    // Where the sum is smallest for equal radii: beyond, spheres are upon their images, and it
+    // would grow.
+    constexpr double CLOSEST = 0.475, LEAST = 0.1;
+    const double larger = std::max(a, b),
+                 shortest = std::min({box.length(0), box.length(1), box.length(2)}),
+                 L = std::max(std::min(std::cbrt(box.volume()), shortest), larger / CLOSEST);
+    return std::max(LEAST / larger,
+                    1 / larger - CUBIC / L + 2 * M_PI / 3 * (a * a + b * b) / (L * L * L));
 }
 
 Magnification magnification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,

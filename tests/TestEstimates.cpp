@@ -2,9 +2,11 @@
 // The error estimates behind the Plan against errors measured by explicit sums.
 
 #include "numerics/HasimotoSplit.h"
+#include "numerics/MixtureErrors.h"
 #include "numerics/Plan.h"
 #include "numerics/ProlateSplit.h"
 #include "numerics/Window.h"
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -336,6 +338,65 @@ TEST(Estimates, WaveErrorIsTheMeasuredError) {
         EXPECT_GT(ratio, 0.5) << "P " << c.P << " M " << c.M;
         EXPECT_LT(ratio, 1.3) << "P " << c.P << " M " << c.M;
     }
+}
+
+TEST(Estimates, WaveErrorAtTheWorstPlaceIsTheMeasuredError) {
+    // A grid point or the middle of a cell; three at one place err like one.
+    for (bool tilted : {false, true})
+        for (int P : {4, 5}) {
+            const double xi = 0.6, beta = 1.9 * P;
+            const HasimotoSplit split(xi);
+            const Window window(P, beta);
+            const Lattice box = boxFor(3, 3 * 4 * M_PI / 3 / 1000, tilted);
+            const std::array<int, 3> grid = {12, 14, 15};
+            double worst = 0;
+            for (double place : {0.0, 0.5})
+                for (int axis = 0; axis < 3; axis++) {
+                    Suspension s(box, 3, 1);
+                    const Vec3 there((2 + place) / grid[0], (3 + place) / grid[1],
+                                     (1 + place) / grid[2]);
+                    s.x.assign(3, box.cartesian(there));
+                    s.f.assign(3, Vec3::Unit(axis));
+                    const Vectors error = difference(griddedWave(s, split, grid, window),
+                                                     exactWave(s, split, 10 * xi));
+                    worst = std::max(worst, rms(error) / 3); // of three forces
+                }
+            const double ratio = worst / waveError(split, box, grid, P, beta, 0, 1e9, 1);
+            EXPECT_GT(ratio, 0.4) << P << " " << tilted;
+            EXPECT_LT(ratio, 1.1) << P << " " << tilted;
+            EXPECT_GT(worst, 1.2 * waveError(split, box, grid, P, beta, 0)) << P << " " << tilted;
+        }
+}
+
+TEST(Estimates, MobilityAmongImagesIsAtMostTheExactOne) {
+    // in a cube the exact one; elsewhere the smallest of three, at most
+    const double xi = 0.6;
+    const HasimotoSplit split(xi);
+    for (const Vec3& edges : {Vec3(5, 5, 5), Vec3(12, 12, 12), Vec3(6, 6, 24), Vec3(6, 20, 20)}) {
+        const Lattice box = Lattice::orthorhombic(edges[0], edges[1], edges[2]);
+        Suspension s(box, 1, 1);
+        s.x[0] = Vec3::Zero();
+        double smallest = 2;
+        for (int axis = 0; axis < 3; axis++) {
+            s.f[0] = Vec3::Unit(axis);
+            Vec3 u = exactWave(s, split, 12 * xi)[0] + split.realScalars(0).F * s.f[0];
+            for (const Vec3& image : box.imagesWithin(8 / xi)) {
+                const double r = image.norm();
+                if (r == 0 || r > 8 / xi)
+                    continue;
+                const PairScalars M = split.realScalars(r);
+                u += M.F * s.f[0] + (M.G - M.F) / (r * r) * image.dot(s.f[0]) * image;
+            }
+            smallest = std::min(smallest, u[axis]);
+        }
+        const double estimate = mobilityAmongImages(box, 1, 1);
+        EXPECT_LT(estimate, 1.03 * smallest) << edges.transpose();
+        EXPECT_GT(estimate, 0.6 * smallest) << edges.transpose();
+        if (edges[0] == edges[2]) {
+            EXPECT_NEAR(estimate, smallest, 1e-4) << edges.transpose();
+        }
+    }
+    EXPECT_GT(mobilityAmongImages(Lattice::orthorhombic(1, 1, 1), 1, 1), 0.09);
 }
 
 TEST(Estimates, WaveErrorOfOneParticleIsThatOfItsSelfMobility) {

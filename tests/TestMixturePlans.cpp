@@ -244,6 +244,33 @@ TEST(MixturePlans, TheRangeIsTheShortestThatTheGridBears) {
     }
 }
 
+TEST(MixtureErrors, AtOnePlaceTheErrorIsThatOfTheWorstPlace) {
+    const Lattice box = Lattice::orthorhombic(9, 9, 9);
+    const std::vector<double> radii = {1, 2};
+    const Mixture mixture(std::make_shared<ProlateEnvelope>(8, 4), radii);
+    const std::array<int, 3> grid = {8, 8, 8};
+    for (int P : {3, 4}) {
+        const RadialWindow window(P, 2.05 * P, RadialWindow::spacing(box, grid));
+        double measured = 0;
+        for (double place : {0.0, 0.5}) {
+            const Vec3 x = box.cartesian(Vec3::Constant((1 + place) / grid[0]));
+            const Eigen::MatrixXd error = Prototype(mixture, box, grid, window, {x, x}).error();
+            for (int j = 0; j < 2; j++) {
+                double velocities = 0;
+                for (double a : radii)
+                    velocities += std::pow(mobilityAmongImages(box, a, radii[j]), 2);
+                const double scale = std::max(1 / radii[j], std::sqrt(velocities));
+                measured = std::max(measured, error.col(3 * j).norm() / scale);
+            }
+        }
+        const MixtureErrors together(Composition(radii), box, 1e-9, 12, Places::Together);
+        const double predicted = together.wave(mixture, grid, &window),
+                     outside = together.wave(mixture, grid, NULL);
+        EXPECT_LT(measured, 1.1 * predicted) << P;
+        EXPECT_GT(measured, 0.2 * (predicted - outside)) << P;
+    }
+}
+
 TEST(MixturePlans, AWiderWindowIsTakenWhereAShorterRangePaysForIt) {
     std::vector<double> radii;
     for (int i = 0; i < 500; i++)

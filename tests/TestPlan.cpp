@@ -2,10 +2,12 @@
 // From one tolerance to numbers: what a Plan promises, chooses and refuses.
 
 #include "numerics/HasimotoSplit.h"
+#include "numerics/MixtureErrors.h"
 #include "numerics/Plan.h"
 #include "numerics/PlanCost.h"
 #include "numerics/ProlateSplit.h"
 #include "numerics/Window.h"
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -158,7 +160,7 @@ TEST(Plan, ProlateGridFollowsTheLengthsOfTheBoxVectors) {
 }
 
 TEST(Plan, OverridesAreRespectedExactly) {
-    PlanRequest r = request(CUBE, 100, 1e-3);
+    PlanRequest r = request(CUBE, 300, 1e-3);
     r.overrides.xi = 0.4321;
     r.overrides.realCutoff = 7.654;
     r.overrides.grid = {23, 31, 37};
@@ -176,10 +178,52 @@ TEST(Plan, OverridesAreRespectedExactly) {
     EXPECT_NEAR(plan.split->waveWeight(1.3), HasimotoSplit(0.4321).waveWeight(1.3), 1e-15);
     const double wave = waveError(*plan.split, CUBE, plan.grid, 6, 12.34, 0.3),
                  real =
-                     plan.split->realTruncation(7.654, 0.3, 100 * 4.0 / 3 * M_PI / CUBE.volume());
+                     plan.split->realTruncation(7.654, 0.3, 300 * 4.0 / 3 * M_PI / CUBE.volume());
     EXPECT_GT(plan.predictedError,
               0.5 * std::hypot(wave, real)); // the Plan may know that pairs are not that far apart
     EXPECT_LT(plan.predictedError, 1.001 * std::hypot(wave, real));
+}
+
+TEST(Plan, FewSpheresKeepTheToleranceAtTheWorstPlace) {
+    const Lattice narrow = Lattice::orthorhombic(9, 9, 9), wide = Lattice::orthorhombic(31, 31, 31),
+                  tilted(Vec3(20, 0, 0), Vec3(10, 20, 0), Vec3(-10, 10, 20));
+    for (const Lattice& box : {narrow, wide, tilted})
+        for (int n : {1, 100})
+            for (double tolerance : {1e-1, 1e-3, 1e-5, 1e-7})
+                for (SplitChoice split :
+                     {SplitChoice::Automatic, SplitChoice::Hasimoto, SplitChoice::AllWaves}) {
+                    PlanRequest r = with(split, request(box, n, tolerance));
+                    if (split == SplitChoice::AllWaves)
+                        r.model = SphereModel::ForceCoupling;
+                    const Plan plan = makePlan(r);
+                    const double together = std::max(1.0 / n, mobilityAmongImages(box, 1, 1)),
+                                 alone = waveError(*plan.split, box, plan.grid, plan.windowSupport,
+                                                   plan.windowShape, 0, 1e9, together);
+                    EXPECT_LE(alone, tolerance) << n << " " << tolerance << " " << plan.splitName();
+                    EXPECT_LE(plan.predictedError, tolerance) << n << " " << tolerance;
+                    EXPECT_EQ(plan.precision,
+                              tolerance < 0.9e-5 ? Precision::Double : Precision::Single)
+                        << n << " " << tolerance;
+                }
+}
+
+TEST(Plan, TheWorstPlaceCostsNoToleranceAndNoPrecision) {
+    for (int n : {1, 50}) {
+        PlanRequest r = request(CUBE, n, 1e-10);
+        EXPECT_LE(makePlan(r).predictedError, 1e-10) << n;
+        r.tolerance = 1e-5;
+        r.singleOnly = true;
+        EXPECT_EQ(makePlan(r).precision, Precision::Single) << n;
+        // a grid for the mean over places, prescribed, is what the mean has to do for
+        r = request(CUBE, 101, 1e-3);
+        r.overrides.xi = 0.4;
+        const Plan many = makePlan(r);
+        r.numParticles = n;
+        r.overrides.grid = many.grid;
+        r.overrides.windowSupport = many.windowSupport;
+        r.overrides.windowShape = many.windowShape;
+        EXPECT_LE(makePlan(r).predictedError, 1e-3) << n;
+    }
 }
 
 TEST(Plan, EachOverrideAloneLeavesTheRestAutomatic) {

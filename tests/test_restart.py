@@ -166,7 +166,7 @@ def testCheckpointOfAnotherPlanIsRefused(platformName, what):
                  "bandwidth": lambda i: i.setNumericalParameters({"prolateBandwidth": 9.75}),
                  "xi": lambda i: i.setSplittingParameter(1.11),
                  "grid": lambda i: i.setGridDimensions(20, 20, 20),
-                 "window": lambda i: i.setWindowSupport(7),
+                 "window": lambda i: i.setWindowSupport(9),
                  "viscosity": lambda i: i.setViscosity(777.0),
                  "radius": lambda i: i.setRadius(0.51),
                  "model": lambda i: i.setMobilityModel(PSEBrownianIntegrator.FreeDraining)}[what]

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""
+All spheres at one place, and that the worst between grid points: what a grid errs by has no mean
+there, and must keep the contract of setErrorTolerance() all the same, for few spheres.
+"""
+import itertools
+
+import numpy as np
+import pytest
+
+import scenes
+from openmmpse import PSEBrownianIntegrator
+from platformnames import allServed
+from scenes import Scene, errorRatio, makeContext
+
+RADIUS = 0.5
+BOXES = {"narrow": scenes.cube(6*RADIUS), "cube": scenes.cube(12*RADIUS), "tilted": scenes.tilted(20*RADIUS)}
+TOLERANCES = (1e-2, 1e-4, 1e-5)
+# model, split, radii of every other sphere over the others
+FAMILIES = {"automatic": ("RotnePragerYamakawa", "AutomaticSplit", 1),
+            "Hasimoto": ("RotnePragerYamakawa", "Hasimoto", 1),
+            "unequal": ("RotnePragerYamakawa", "AutomaticSplit", 2),
+            "unequal, Hasimoto": ("RotnePragerYamakawa", "Hasimoto", 2),
+            "Gaussian envelopes": ("ForceCoupling", "AutomaticSplit", 1),
+            "Gaussian envelopes, waves alone": ("ForceCoupling", "AllWaves", 1)}
+# Of a cell of the grid, which is fixed in the box: where a sum of three cosines is largest and smallest.
+CORNERS = [np.array(corner) for corner in ((0, 0, 0), (0.5, 0.5, 0.5))]
+
+
+def configure(family):
+    model, split, _ = FAMILIES[family]
+
+    def set(integrator):
+        integrator.setMobilityModel(getattr(PSEBrownianIntegrator, model))
+        integrator.setSplit(getattr(PSEBrownianIntegrator, split))
+    return set
+
+
+def mobilityOf(family, scene):
+    """The exact one (3N,3N): of the oracle, or, of Gaussian envelopes, of a tight sum over waves."""
+    if FAMILIES[family][0] == "RotnePragerYamakawa":
+        return scene.mobility
+    _, integrator = makeContext(scene, "Reference", tolerance=1e-9, configure=configure(family))
+    return scenes.mobilityColumns(integrator, scene.count)
+
+
+@pytest.mark.hostOnly
+@pytest.mark.withGrid
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("box", BOXES)
+def testAtTheWorstPlaceBetweenGridPoints(platformName, box, family):
+    """Uniform and random forces."""
+    ratio = FAMILIES[family][2]
+    pair = Scene(np.zeros((2, 3)), BOXES[box], RADIUS, None if ratio == 1 else np.array([ratio, 1])*RADIUS)
+    of = mobilityOf(family, pair).reshape(2, 3, 2, 3)
+    failures = []
+    for count, tolerance in itertools.product((1, 7), allServed(platformName, TOLERANCES)):
+        if count == 1 and ratio != 1:
+            continue
+        kind = np.arange(count) % 2
+        M = of[kind][:, :, kind].reshape(3*count, 3*count)
+        radii = None if ratio == 1 else np.where(kind == 0, ratio, 1)*RADIUS
+        scene = Scene(np.zeros((count, 3)), BOXES[box], RADIUS, radii)
+        context, integrator = makeContext(scene, platformName, tolerance=tolerance, configure=configure(family))
+        grid = np.array(integrator.getNumericalParameters()["gridDimensions"])
+        for corner in CORNERS:
+            context.setPositions(np.tile((1 + corner)/grid @ BOXES[box], (count, 1)))
+            for forces in (scenes.uniformForces(scene), scenes.randomForces(scene)):
+                exact = (M @ forces.ravel()).reshape(-1, 3)
+                error = errorRatio(integrator.applyMobility(forces), exact, forces, scene)/tolerance
+                if not error <= 1:
+                    failures.append(f"{count} at {tolerance:g}, {corner}: {error:.2f} tolerances")
+    assert not failures, "; ".join(failures)
