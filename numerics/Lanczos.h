@@ -51,7 +51,8 @@ public:
      * |M^{1/2} z|, whose exact value |z| sqrt(alpha_1) is known after the first iteration. The true
      * error is below 2 tolerances for condition numbers up to 50, below 6 up to 1e8. Where there
      * may be many iterations, a change that falls out of line ends nothing for three of them:
-     * eigenvalues in groups (unequal spheres at one place) are found group by group.
+     * eigenvalues in groups (unequal spheres at one place) are found group by group, and errors
+     * of 10 tolerances are seen.
      * @param alpha  diagonal entry of this iteration
      * @param beta   norm of the next basis vector before normalisation (0: the Krylov space is
      * exhausted)
@@ -86,10 +87,10 @@ private:
 
 /**
  * Take out of a vector what it has of all basis vectors, classical Gram-Schmidt: one pass over the
- * basis finds all overlaps, another removes them. Where that takes more than half of it, what is
- * left has overlaps of its own by rounding, and both are done once more; twice is enough (Daniel,
- * Gragg, Kaufman and Stewart 1976). Where a three-term recurrence has just removed all that it can,
- * once nearly always is.
+ * basis finds all overlaps, another removes them. Where that takes more than half of its square,
+ * what is left has overlaps of its own by rounding, and both are done once more; twice is enough
+ * (Daniel, Gragg, Kaufman and Stewart 1976). Where a three-term recurrence has just removed all
+ * that it can, once nearly always is.
  * @param norms   of the basis vectors
  * @param square  that of the vector
  * @return the square of what is left

@@ -70,6 +70,7 @@ void CpuEngine<Real>::computeVelocities(const std::vector<Vec3>* forces, const T
         return;
     }
     u.resize(indices.size());
+    clock.start();
     threads.keepAwake([&] { setVelocities(scale, forces, thermal, u); });
 }
 
@@ -77,7 +78,6 @@ template <class Real>
 void CpuEngine<Real>::setVelocities(const ForceUnit& scale, const std::vector<Vec3>* forces,
                                     const Thermal* thermal, std::vector<Vec3>& u) {
     const double unit = scale.unit;
-    clock.start();
     const bool forced = scale.forced;
     const Real noise = Real(scale.noise);
     if (forced && realSpace) {

@@ -33,13 +33,13 @@ void CpuUnbounded<Real>::computeVelocities(const std::vector<Vec3>* forces, cons
     u.assign(indices.size(), Vec3::Zero());
     if (scale.unit == 0)
         return;
+    clock.start();
     threads.keepAwake([&] { addVelocities(scale, forces, thermal, u); });
 }
 
 template <class Real>
 void CpuUnbounded<Real>::addVelocities(const ForceUnit& scale, const std::vector<Vec3>* forces,
                                        const Thermal* thermal, std::vector<Vec3>& u) {
-    clock.start();
     pairs.expectMore(scale.noise > 0);
     if (scale.forced) {
         multiply(*forces, scale.unit);

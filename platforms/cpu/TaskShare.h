@@ -3,6 +3,7 @@
 #define OPENMMPSE_TASKSHARE_H_
 
 #include <atomic>
+#include <chrono>
 #include <hwy/cache_control.h>
 #include <thread>
 
@@ -43,18 +44,25 @@ public:
     void end() { over.store(true, std::memory_order_release); }
 
 private:
-    /** Waits between two looks: at first as shortly as it can, later others may have the core. */
+    /**
+     * Waits between two looks: at first as shortly as it can, then others may have the core, and
+     * after about a millisecond it sleeps, so that many threads with little to do use no more than
+     * their share of a machine.
+     */
     class Patience {
     public:
         void wait() {
-            if (looks++ < SHORT_LOOKS)
+            looks++;
+            if (looks < SHORT_LOOKS)
                 hwy::Pause();
-            else
+            else if (looks < MOST_LOOKS)
                 std::this_thread::yield();
+            else
+                std::this_thread::sleep_for(std::chrono::microseconds(50));
         }
 
     private:
-        static constexpr int SHORT_LOOKS = 1000;
+        static constexpr int SHORT_LOOKS = 1000, MOST_LOOKS = 3000;
         int looks = 0;
     };
 

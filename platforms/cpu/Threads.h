@@ -48,8 +48,8 @@ public:
     /**
      * Call body(). Until it returns the other threads wait for the tasks of run() without going to
      * sleep: a run() then takes about a microsecond besides its tasks, not the waking of threads,
-     * which is many times that. For many short runs one after another; a body that is long between
-     * them keeps the other threads busy with nothing. The pool must have no other use meanwhile.
+     * which is many times that. For many short runs one after another. The pool must have no other
+     * use meanwhile.
      */
     template <class Body> void keepAwake(Body body) const {
         if (serial || share != nullptr) {
