@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/MixtureErrors.h"
+#include "numerics/NearImages.h"
 #include "numerics/PlanFamily.h"
 #include "numerics/Quadrature.h"
 #include "numerics/SphericalBessel.h"
@@ -104,8 +105,8 @@ public:
 };
 
 MixtureErrors::MixtureErrors(const Composition& composition, const Lattice& box, double phi,
-                             double extent, Places places)
-    : composition(composition), box(box), damping(missingModes(box, extent)), places(places) {
+                             double extent, double spacing)
+    : composition(composition), box(box), damping(missingModes(box, extent)), spacing(spacing) {
     const int n = composition.size();
     radii = Eigen::Map<const Eigen::ArrayXd>(composition.radii.data(), n);
     mean = Eigen::Map<const Eigen::ArrayXd>(composition.counts.data(), n) / box.volume();
@@ -119,7 +120,7 @@ MixtureErrors::MixtureErrors(const Composition& composition, const Lattice& box,
 
 MixtureErrors::Parts MixtureErrors::none() const {
     const int n = composition.size();
-    const int m = (places == Places::Together ? n : 0);
+    const int m = (together() ? n : 0);
     return {Eigen::MatrixXd::Zero(n, n), Eigen::ArrayXd::Zero(n), Eigen::MatrixXd::Zero(m, m)};
 }
 
@@ -128,11 +129,15 @@ double MixtureErrors::atOnePlace(const Eigen::MatrixXd& errors, int j) const {
     const double n = composition.counts[j];
     double velocities = 0, wrong = 0;
     for (int i = 0; i < composition.size(); i++) {
-        const double mobility = mobilityAmongImages(box, radii[i], radii[j]);
+        const double mobility = mobilityAmongImages(spacing, radii[i], radii[j]);
         velocities += composition.counts[i] * mobility * mobility;
         wrong += composition.counts[i] * errors(i, j) * errors(i, j);
     }
-    return wrong / std::max(radii[j] * radii[j] * velocities, 1 / n);
+    const double all = wrong / std::max(radii[j] * radii[j] * velocities, 1 / n);
+    // The other kinds may be elsewhere, and with them much motion that has little error.
+    const double mobility = mobilityAmongImages(spacing, radii[j], radii[j]),
+                 own = errors(j, j) / std::max(radii[j] * mobility, 1 / n);
+    return std::max(all, own * own);
 }
 
 double MixtureErrors::worst(const Parts& parts) const {
@@ -140,7 +145,7 @@ double MixtureErrors::worst(const Parts& parts) const {
     for (int j = 0; j < composition.size(); j++) {
         const Eigen::ArrayXd pairs = parts.pairs.col(j).array();
         const double around = std::max((dense * pairs).sum(), (alone * pairs).maxCoeff());
-        const double there = (places == Places::Together ? atOnePlace(parts.together, j) : 0);
+        const double there = (together() ? atOnePlace(parts.together, j) : 0);
         largest = std::max(largest, radii[j] * std::sqrt(around + parts.self[j] + there));
     }
     return largest;
@@ -171,7 +176,7 @@ double MixtureErrors::realTruncation(const Mixture& mixture) const {
     Parts parts = none();
     Eigen::MatrixXd alike = parts.pairs;
     std::vector<Vec3> images;
-    if (places == Places::Together && box.imageCandidates(farthest) <= MOST_IMAGES)
+    if (together() && box.imageCandidates(farthest) <= MOST_IMAGES)
         images = box.imagesWithin(farthest);
     for (int i = 0; i < composition.size(); i++)
         for (int j = 0; j <= i; j++) {
@@ -225,7 +230,7 @@ void MixtureErrors::addOutside(const Mixture& mixture, const Cell& cell, const R
             PROJECTION * FACTOR * FACTOR * share * H * H / (k * k) * squares * squares.transpose();
         lost += PROJECTION * FACTOR * share * H * squares.array();
     }
-    if (places == Places::Together)
+    if (together())
         parts.together += (lost.sqrt().matrix() * lost.sqrt().matrix().transpose());
     else
         parts.self += lost.square();
@@ -234,14 +239,13 @@ void MixtureErrors::addOutside(const Mixture& mixture, const Cell& cell, const R
 void MixtureErrors::addAliases(const Mixture& mixture, const Cell& cell, const RadialWindow& window,
                                Parts& parts) const {
     const int n = composition.size();
-    const bool together = (places == Places::Together);
     const size_t numAliases = cell.aliases.size();
     const double end = std::min(mixture.largestWaveNumber(), window.band());
     Eigen::ArrayXd bias = Eigen::ArrayXd::Zero(n);
     // what the self mobility ripples with along each reciprocal vector of the grid: 4 R cos(G.x)
     std::vector<Matrix3> ripple(numAliases * n, Matrix3::Zero());
     // and the mobility of two at one place, a third of the trace
-    std::vector<Eigen::MatrixXd> mutual(together ? numAliases : 0, Eigen::MatrixXd::Zero(n, n));
+    std::vector<Eigen::MatrixXd> mutual(together() ? numAliases : 0, Eigen::MatrixXd::Zero(n, n));
     for (size_t q = 0; q < cell.k.size(); q++) {
         const Vec3& k = cell.k[q];
         const double k2 = k.squaredNorm(), norm = std::sqrt(k2);
@@ -257,7 +261,7 @@ void MixtureErrors::addAliases(const Mixture& mixture, const Cell& cell, const R
             const Eigen::ArrayXd first = own * window.transform(up) * sincs(up, radii),
                                  second = own * window.transform(down) * sincs(down, radii);
             aliases += first.square() + second.square();
-            if (together)
+            if (together())
                 mutual[g] += 2.0 / 3 * 0.5 * cell.weight[q] * full * s.matrix() *
                              (first + second).matrix().transpose();
             else
@@ -270,7 +274,7 @@ void MixtureErrors::addAliases(const Mixture& mixture, const Cell& cell, const R
                        (one * more.transpose() + more * one.transpose() + more * more.transpose());
         bias += 2.0 / 3 * cell.weight[q] * full * aliases;
     }
-    if (together) {
+    if (together()) {
         // Of different radii the mean of the one spread and the other gathered, and the reverse;
         // their bias is at most the geometric mean.
         for (const Eigen::MatrixXd& R : mutual)

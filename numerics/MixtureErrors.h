@@ -25,18 +25,6 @@ struct Composition {
     double volume() const;
 };
 
-/** What estimates of errors know of the places of spheres between grid points. */
-enum class Places {
-    Spread,  ///< as many at each: the mean square counts
-    Together ///< all may be at one, and that the worst
-};
-
-/**
- * Mobility of a sphere of radius a for a force on one of radius b at its place, or on itself, among
- * all images, 1/(6 pi eta) [T14]; at least a tenth of that without images.
- */
-double mobilityAmongImages(const Lattice& box, double a, double b);
-
 /**
  * Root mean square errors of M f for a mixture [T27]. One force of random direction on one particle
  * makes errors in the velocities of all; each estimate is the largest, over all radii, of their
@@ -51,9 +39,11 @@ public:
      * @param phi  volume fraction about a particle, of the mixture and also of each kind alone, as
      * in a cluster of its like; at least that of the box counts
      * @param extent  pairs farther apart are left out of the estimate of the grid
+     * @param spacing  of the images (see NearImages.h) of one place where any may be, which may be
+     * the worst one; 0: as many are at each place, and the mean square counts
      */
     MixtureErrors(const Composition& composition, const Lattice& box, double phi, double extent,
-                  Places places = Places::Spread);
+                  double spacing = 0);
 
     /**
      * What a prolate envelope of the bandwidth drops beyond its end, in pairs; an upper bound,
@@ -83,9 +73,10 @@ private:
 
     Parts none() const;
     double worst(const Parts& parts) const;
+    bool together() const { return spacing > 0; }
     /**
-     * Square of the error of all at one place for forces on kind j, relative to what they do, in
-     * the unit of Parts::self.
+     * Square of the error at one place, of all or of one kind alone, for forces on kind j, relative
+     * to what they do, in the unit of Parts::self.
      */
     double atOnePlace(const Eigen::MatrixXd& errors, int j) const;
     void addOutside(const Mixture& mixture, const Cell& cell, const RadialWindow* window,
@@ -95,8 +86,7 @@ private:
 
     Composition composition;
     Lattice box;
-    double damping;
-    Places places;
+    double damping, spacing;
     Eigen::ArrayXd radii, mean, dense, alone; ///< number densities
 };
 

@@ -63,7 +63,7 @@ MixturePlans::MixturePlans(const PlanRequest& request, Places places)
       errors(composition, box, phi,
              std::min(extent,
                       LARGEST_EXTENT * std::cbrt(composition.volume() / composition.particles())),
-             places) {}
+             places == Places::Together ? imageSpacing() : 0) {}
 
 double MixturePlans::unitRadius(const std::vector<double>& radii) {
     double squares = 0;

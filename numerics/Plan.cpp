@@ -145,8 +145,8 @@ namespace {
  */
 constexpr double WORTH_A_CHANGE = 0.05;
 
-/// Spheres up to which all may be at one place, and that the worst between grid points; of more, as
-/// many are taken to be at each. Plans of so few cost little, whatever their grid.
+/// Spheres up to which all may be at one place, which may be the worst between grid points; of
+/// more, as many are taken to be at each. Plans of so few cost little, whatever their grid.
 constexpr int FEW = 100;
 
 Plan hasimotoPlan(const PlanRequest& request, Places places, const std::string& reason) {
@@ -242,8 +242,8 @@ Plan makePlan(const PlanRequest& request) {
     if (worst && worst->predictedError <= request.tolerance &&
         (worst->precision == Precision::Single || !singleDoes))
         return *worst;
-    // Near the ends of single and double precision, and on a grid that is prescribed, the mean over
-    // places has to do.
+    // Near the ends of single and double precision, and where a prescribed grid or window does not
+    // serve the worst place, the mean over places has to do.
     const Plan mean = planFor(request, Places::Spread);
     const bool better = mean.predictedError <= request.tolerance &&
                         (mean.precision == Precision::Single || !singleDoes);

@@ -83,8 +83,9 @@ struct Plan {
     double lanczosTolerance; ///< relative error of the real-space noise
     double tableError;       ///< absolute error allowed in tables, 1/(6 pi eta a)
     double windowError;      ///< absolute error allowed in the weights of the window
-    /// rms error of M f for unit random forces, 1/(6 pi eta a); of few spheres with what the grid
-    /// errs by at its worst place, where all may be
+    /// Root mean square error of M f for unit random forces, 1/(6 pi eta a). Of up to 100 spheres
+    /// with what the grid errs by at its worst place, where all may be, unless the mean over places
+    /// had to do: see makePlan().
     double predictedError;
     Precision precision;
     /// made for a box that moves: wave factors are made anew, fast, for each shape of it
@@ -105,8 +106,9 @@ bool isMixture(const std::vector<double>& radii);
 /**
  * Choose all parameters so that the predicted error for unit random forces at volume fraction
  * max(phi, 0.3) keeps the tolerance (with Hasimoto's split each half at most tolerance/2), at the
- * lowest cost by the model of PlanCost.h. Few spheres keep it where all are at one place, too, the
- * worst between grid points, unless that would cost the precision.
+ * lowest cost by the model of PlanCost.h. Up to 100 spheres keep it where all are at one place,
+ * too, the worst between grid points, unless that would cost the precision or cannot be had, also
+ * with what is prescribed.
  * @throws std::invalid_argument naming what cannot be met
  */
 Plan makePlan(const PlanRequest& request);

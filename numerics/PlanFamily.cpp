@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "numerics/PlanFamily.h"
 #include "numerics/HasimotoSplit.h"
+#include "numerics/NearImages.h"
 #include "numerics/PlanCost.h"
 #include "numerics/Window.h"
 #include <algorithm>
@@ -134,12 +135,20 @@ PlanFamily::PlanFamily(const PlanRequest& request, double share, Places places)
       phi(std::max(meanPhi, LOCAL_VOLUME_FRACTION)), extent(extentOf(request, phi)),
       places(places) {}
 
+double PlanFamily::imageSpacing() const {
+    if (!request.moving)
+        return numerics::imageSpacing(box);
+    return std::min(request.shortest * std::cbrt(box.volume()),
+                    narrowestWidth(request) / request.radius);
+}
+
 double PlanFamily::together() const {
     if (places == Places::Spread)
         return 0;
     // N spheres at one place move N times as fast as one by its force: an error is relative to
     // that, or to what each would do alone
-    return std::max(1.0 / request.numParticles, mobilityAmongImages(box, 1, 1));
+    return std::max(1.0 / request.numParticles,
+                    mobilityAmongImages(imageSpacing(), 1, 1, request.model));
 }
 
 double PlanFamily::windowError() const {
@@ -284,7 +293,7 @@ Plan PlanFamily::finished(const Plan& plan, double unit) const {
         for (int wider = 1; wider <= MORE_SUPPORT; wider++) // for what the usual ones cannot do
             candidates.push_back(std::min(candidates[0] + wider, LARGEST_SUPPORT));
     Plan best = plan;
-    double bestWave = std::numeric_limits<double>::infinity();
+    double bestWave = std::numeric_limits<double>::infinity(), leastError = bestWave;
     bool fits = false;
     for (size_t i = 0; i < candidates.size() && !(fits && i >= usual); i++) {
         Plan candidate = plan;
@@ -293,12 +302,14 @@ Plan PlanFamily::finished(const Plan& plan, double unit) const {
             candidate.windowShape = shapeOf(candidates[i]);
         double wave = 0;
         // no grid mends what a window makes of rounding
-        const bool fit = fitGrid(candidate, unit, wave) &&
-                         magnificationOf(candidate).of(SMALLEST_WINDOW_ERROR) <=
-                             ROUNDING_SHARE * request.tolerance;
-        if (fit == fits ? (fit ? cost(candidate) < cost(best) : wave < bestWave) : fit) {
+        const bool fitting = fitGrid(candidate, unit, wave);
+        const double magnified = magnificationOf(candidate).of(SMALLEST_WINDOW_ERROR),
+                     both = rootOfSquares(wave, magnified);
+        const bool fit = fitting && magnified <= ROUNDING_SHARE * request.tolerance;
+        if (fit == fits ? (fit ? cost(candidate) < cost(best) : both < leastError) : fit) {
             best = candidate;
             bestWave = wave;
+            leastError = both;
         }
         fits = fits || fit;
     }

@@ -34,6 +34,12 @@ double narrowestWidth(const PlanRequest& request);
 void checkPlan(const Plan& plan, const PlanRequest& request);
 /** Whether the caller has left so little open that the splits cannot be compared. */
 bool isPrescribed(const PlanOverrides& wish);
+/** What estimates of errors know of the places of spheres between grid points. */
+enum class Places {
+    Spread,  ///< as many at each: the mean square counts
+    Together ///< all may be at one, which may be the worst
+};
+
 /** makePlan() for force coupling [T44]. */
 Plan makeForceCouplingPlan(const PlanRequest& request, Places places);
 
@@ -72,6 +78,9 @@ protected:
     void predict(Plan& plan, double wave) const;
     /** That no grid helps this window, in words. */
     std::string windowRefusal(const Plan& plan, double wave) const;
+
+    /** Of one place where all may be, as near as they come in boxes that the Plan must serve. */
+    double imageSpacing() const;
 
     const PlanRequest& request;
     Lattice box;

@@ -40,19 +40,19 @@ Split::DroppedWaves Split::droppedWaves(const std::array<double, 3>& faces) cons
 }
 
 double Split::waveTruncation(double kMax, double phi) const {
-    return errorOf(droppedWaves(kMax), phi);
+    return truncationOf(droppedWaves(kMax), phi).total();
 }
 
-double Split::bandTruncation(const std::array<double, 3>& faces, double phi) const {
-    return errorOf(droppedWaves(faces), phi);
+Split::Truncation Split::bandTruncation(const std::array<double, 3>& faces, double phi) const {
+    return truncationOf(droppedWaves(faces), phi);
 }
 
-double Split::errorOf(const DroppedWaves& dropped, double phi) const {
+Split::Truncation Split::truncationOf(const DroppedWaves& dropped, double phi) const {
     const double density = 3 * phi / (4 * M_PI);
     // b = 6 pi w/k^2; mean of |I - kk|, measure of the k integral
     const double factor = 6 * M_PI, projection = (2.0 / 3) / (2 * M_PI * M_PI);
-    const double self = projection * factor * dropped.self;
-    return std::sqrt(density * projection * factor * factor * dropped.pairs + self * self);
+    return {std::sqrt(density * projection * factor * factor * dropped.pairs),
+            projection * factor * dropped.self};
 }
 
 double Split::waveCutoff(double error, double phi) const {

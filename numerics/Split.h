@@ -16,6 +16,7 @@
 #include "numerics/Rpy.h"
 #include "numerics/SphereModel.h"
 #include <array>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -56,11 +57,16 @@ public:
      * dropping all wave numbers above kMax [T12], beside those that the split itself drops [T22].
      */
     double waveTruncation(double kMax, double phi) const;
+    /** Parts that add in squares: of pairs, and of the self mobility. */
+    struct Truncation {
+        double pairs, self;
+        double total() const { return std::sqrt(pairs * pairs + self * self); }
+    };
     /**
      * The same for all wave vectors outside the Nyquist cell of a grid, or more [T14].
      * @param faces  distances of the three pairs of faces of that cell from k = 0
      */
-    double bandTruncation(const std::array<double, 3>& faces, double phi) const;
+    Truncation bandTruncation(const std::array<double, 3>& faces, double phi) const;
     /**
      * Smallest wave number above which waveTruncation() is at most error; the end of w if none is.
      */
@@ -102,7 +108,7 @@ protected:
     DroppedWaves integrateOutside(const std::array<double, 3>& faces, double to) const;
 
 private:
-    double errorOf(const DroppedWaves& dropped, double phi) const;
+    Truncation truncationOf(const DroppedWaves& dropped, double phi) const;
 
     SphereModel sphereModel;
 };

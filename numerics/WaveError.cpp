@@ -11,6 +11,10 @@ namespace PSE::numerics {
 
 namespace {
 
+/// Periods of the grid. Where the edge of the window is what limits it, aliases fall as 1/p only:
+/// at the worst place those from farther away count, too.
+constexpr int FARTHEST_ALIASES = 8;
+
 /**
  * Sum over the modes k != 0 of k^-4. The integral V/(2 pi)^3 Int (k^2 + c^2)^-2 d^3k = V/(8 pi c)
  * equals it for the c that waveError() puts in place of the missing mode k = 0; c = 3.751/L in a
@@ -39,8 +43,8 @@ double inverseFourthPowers(const Lattice& box) {
 }
 
 /** The window's transform p periods above each node, relative to that there, p = 1, 2, ... */
-std::vector<std::vector<double>> neighbours(const Window& window, const Quadrature& rule,
-                                            int periods) {
+std::vector<std::vector<double>> aliasRatios(const Window& window, const Quadrature& rule,
+                                             int periods) {
     std::vector<std::vector<double>> all(periods);
     for (int p = 1; p <= periods; p++)
         for (double theta : rule.nodes)
@@ -72,10 +76,8 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
     constexpr int NODES = 24;
     const Quadrature rule = gradedBand(NODES);
     const Window window(windowSupport, windowShape);
-    // Where the edge of the window is what limits it, aliases from farther away count, too: they
-    // fall as 1/p.
-    const int periods = (together > 0 ? 8 : 1);
-    const std::vector<std::vector<double>> neighbour = neighbours(window, rule, periods);
+    const int periods = (together > 0 ? FARTHEST_ALIASES : 1);
+    const std::vector<std::vector<double>> ratios = aliasRatios(window, rule, periods);
     std::vector<double> aliasing(NODES);
     for (int i = 0; i < NODES; i++)
         aliasing[i] = window.aliasing(rule.nodes[i]);
@@ -92,8 +94,9 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
     const double damping = missingModes(box, extent);
     const double density = 3 * phi / (4 * M_PI);
     double pairs = 0, bias = 0;
-    // of each period: (direction of the ripple, component of the force)
-    std::vector<Matrix3> ripple(periods, Matrix3::Zero());
+    // of each axis: what the modes at each of its nodes add up to (component of the force, node)
+    using Modes = Eigen::Matrix<double, 3, NODES>;
+    std::array<Modes, 3> modes = {Modes::Zero(), Modes::Zero(), Modes::Zero()};
     for (int i = 0; i < NODES / 2; i++) // w(-k) = w(k): one half, twice
         for (int j = 0; j < NODES; j++)
             for (int l = 0; l < NODES; l++) {
@@ -108,35 +111,31 @@ double waveError(const Split& split, const Lattice& box, const std::array<int, 3
                 bias += weight * full * all;
                 const int node[3] = {i, j, l},
                           mirror[3] = {NODES - 1 - i, NODES - 1 - j, NODES - 1 - l};
-                const Vec3 transverse = Vec3::Ones() - k.cwiseProduct(k) / k2;
-                for (int p = 0; p < periods; p++)
-                    for (int d = 0; d < 3; d++)
-                        ripple[p].row(d) += 0.5 * weight * full *
-                                            (neighbour[p][node[d]] + neighbour[p][mirror[d]]) *
-                                            transverse.transpose();
+                const Vec3 transverse =
+                    0.5 * weight * full * (Vec3::Ones() - k.cwiseProduct(k) / k2);
+                for (int d = 0; d < 3; d++) {
+                    modes[d].col(node[d]) += transverse;
+                    modes[d].col(mirror[d]) += transverse;
+                }
             }
+    // of each period: (direction of the ripple, component of the force)
+    std::vector<Matrix3> ripple(periods, Matrix3::Zero());
+    for (int p = 0; p < periods; p++)
+        for (int d = 0; d < 3; d++)
+            for (int n = 0; n < NODES; n++)
+                ripple[p].row(d) += ratios[p][n] * modes[d].col(n).transpose();
     // A particle at x feels a ripple 4 R_d cos(2 pi x_d/h_d) in its self mobility, of mean square 8
     // R_d^2. At the worst place all cosines have one sign, and what is lost adds up with them.
-    const double lost = (together > 0 ? split.bandTruncation(faces, 0) : 0);
-    double worst = 2 * bias / 3 + lost;
-    for (const Matrix3& R : ripple)
-        worst += 4 * R.cwiseAbs().sum() / 3;
-    const double self = together > 0 ? std::pow(worst / together, 2)
-                                     : 8 * ripple[0].squaredNorm() / 3 + std::pow(2 * bias / 3, 2);
-    const double truncation = split.bandTruncation(faces, phi);
-    return std::sqrt(density * 2 / 3 * pairs + self + truncation * truncation - lost * lost);
-}
-
-double mobilityAmongImages(const Lattice& box, double a, double b) {
-    constexpr double CUBIC = 2.8373; // of a cube, whose edge the shortest vector is taken for
-    // Where the sum is smallest for equal radii: beyond, spheres are upon their images, and it
-    // would grow.
-    constexpr double CLOSEST = 0.475, LEAST = 0.1;
-    const double larger = std::max(a, b),
-                 shortest = std::min({box.length(0), box.length(1), box.length(2)}),
-                 L = std::max(std::min(std::cbrt(box.volume()), shortest), larger / CLOSEST);
-    return std::max(LEAST / larger,
-                    1 / larger - CUBIC / L + 2 * M_PI / 3 * (a * a + b * b) / (L * L * L));
+    const Split::Truncation lost = split.bandTruncation(faces, phi);
+    double self =
+        8 * ripple[0].squaredNorm() / 3 + std::pow(2 * bias / 3, 2) + lost.self * lost.self;
+    if (together > 0) {
+        double worst = 2 * bias / 3 + lost.self;
+        for (const Matrix3& R : ripple)
+            worst += 4 * R.cwiseAbs().sum() / 3;
+        self = std::pow(worst / together, 2);
+    }
+    return std::sqrt(density * 2 / 3 * pairs + self + lost.pairs * lost.pairs);
 }
 
 Magnification magnification(const Split& split, const Lattice& box, const std::array<int, 3>& grid,

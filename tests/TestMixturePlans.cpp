@@ -4,6 +4,7 @@
 
 #include "numerics/MixtureErrors.h"
 #include "numerics/MixtureTable.h"
+#include "numerics/NearImages.h"
 #include "numerics/Plan.h"
 #include <array>
 #include <cmath>
@@ -246,28 +247,42 @@ TEST(MixturePlans, TheRangeIsTheShortestThatTheGridBears) {
 
 TEST(MixtureErrors, AtOnePlaceTheErrorIsThatOfTheWorstPlace) {
     const Lattice box = Lattice::orthorhombic(9, 9, 9);
-    const std::vector<double> radii = {1, 2};
-    const Mixture mixture(std::make_shared<ProlateEnvelope>(8, 4), radii);
     const std::array<int, 3> grid = {8, 8, 8};
-    for (int P : {3, 4}) {
-        const RadialWindow window(P, 2.05 * P, RadialWindow::spacing(box, grid));
+    struct Case {
+        double large;
+        int count, P;
+    };
+    for (const Case& test : {Case{2, 1, 3}, Case{2, 1, 4}, Case{2, 20, 3}, Case{1.2, 20, 4}}) {
+        const double radii[] = {1, test.large};
+        const int counts[] = {1, test.count};
+        const Mixture mixture(std::make_shared<ProlateEnvelope>(8, 4), {1, test.large});
+        const RadialWindow window(test.P, 2.05 * test.P, RadialWindow::spacing(box, grid));
         double measured = 0;
         for (double place : {0.0, 0.5}) {
             const Vec3 x = box.cartesian(Vec3::Constant((1 + place) / grid[0]));
             const Eigen::MatrixXd error = Prototype(mixture, box, grid, window, {x, x}).error();
             for (int j = 0; j < 2; j++) {
-                double velocities = 0;
-                for (double a : radii)
-                    velocities += std::pow(mobilityAmongImages(box, a, radii[j]), 2);
-                const double scale = std::max(1 / radii[j], std::sqrt(velocities));
-                measured = std::max(measured, error.col(3 * j).norm() / scale);
+                // like forces on all of a kind; the others are elsewhere, or there
+                const double like = 1 / (radii[j] * std::sqrt(counts[j]));
+                double velocities = 0, wrong = 0;
+                for (int i : {j, 1 - j}) {
+                    const double mobility = mobilityAmongImages(9, radii[i], radii[j]);
+                    velocities += counts[i] * mobility * mobility;
+                    wrong += counts[i] * error.block<3, 1>(3 * i, 3 * j).squaredNorm();
+                    measured = std::max(measured,
+                                        std::sqrt(wrong) / std::max(like, std::sqrt(velocities)));
+                }
             }
         }
-        const MixtureErrors together(Composition(radii), box, 1e-9, 12, Places::Together);
-        const double predicted = together.wave(mixture, grid, &window),
-                     outside = together.wave(mixture, grid, NULL);
-        EXPECT_LT(measured, 1.1 * predicted) << P;
-        EXPECT_GT(measured, 0.2 * (predicted - outside)) << P;
+        const auto predicted = [&](const std::vector<double>& spheres) {
+            return MixtureErrors(Composition(spheres), box, 1e-9, 12, imageSpacing(box))
+                .wave(mixture, grid, &window);
+        };
+        std::vector<double> all(test.count, test.large);
+        all.push_back(1);
+        EXPECT_LT(measured, 1.1 * predicted(all)) << test.large << " " << test.P;
+        EXPECT_GT(measured, 0.2 * predicted(all)) << test.large << " " << test.P;
+        EXPECT_LE(predicted({1}), predicted(all)) << test.large << " " << test.P;
     }
 }
 

@@ -2,7 +2,7 @@
 // From one tolerance to numbers: what a Plan promises, chooses and refuses.
 
 #include "numerics/HasimotoSplit.h"
-#include "numerics/MixtureErrors.h"
+#include "numerics/NearImages.h"
 #include "numerics/Plan.h"
 #include "numerics/PlanCost.h"
 #include "numerics/ProlateSplit.h"
@@ -43,6 +43,13 @@ void expectMentions(const std::string& message, const std::vector<std::string>& 
     for (const std::string& word : words)
         EXPECT_NE(message.find(word), std::string::npos)
             << "'" << word << "' is not in: " << message;
+}
+
+double errorAtOnePlace(const Plan& plan, const PlanRequest& r, double spacing) {
+    const double together =
+        std::max(1.0 / r.numParticles, mobilityAmongImages(spacing, 1, 1, r.model));
+    return waveError(*plan.split, r.box, plan.grid, plan.windowSupport, plan.windowShape, 0, 1e9,
+                     together);
 }
 
 } // namespace
@@ -196,15 +203,26 @@ TEST(Plan, FewSpheresKeepTheToleranceAtTheWorstPlace) {
                     if (split == SplitChoice::AllWaves)
                         r.model = SphereModel::ForceCoupling;
                     const Plan plan = makePlan(r);
-                    const double together = std::max(1.0 / n, mobilityAmongImages(box, 1, 1)),
-                                 alone = waveError(*plan.split, box, plan.grid, plan.windowSupport,
-                                                   plan.windowShape, 0, 1e9, together);
-                    EXPECT_LE(alone, tolerance) << n << " " << tolerance << " " << plan.splitName();
+                    EXPECT_LE(errorAtOnePlace(plan, r, imageSpacing(box)), tolerance)
+                        << n << " " << tolerance << " " << plan.splitName();
                     EXPECT_LE(plan.predictedError, tolerance) << n << " " << tolerance;
                     EXPECT_EQ(plan.precision,
                               tolerance < 0.9e-5 ? Precision::Double : Precision::Single)
                         << n << " " << tolerance;
                 }
+}
+
+TEST(Plan, FewSpheresKeepTheToleranceAtTheWorstPlaceOfTheSmallestBox) {
+    constexpr double L = 5, SHARE = 0.45; // of the tolerance, for the grid in a small box
+    for (double tolerance : {1e-1, 1e-3, 1e-4})
+        for (SphereModel model : {SphereModel::RotnePragerYamakawa, SphereModel::ForceCoupling}) {
+            PlanRequest r = request(Lattice::orthorhombic(L, L, L), 10, tolerance);
+            r.model = model;
+            r.moving = true;
+            r.shortest = 0.8;
+            EXPECT_LE(errorAtOnePlace(makePlan(r), r, r.shortest * L), SHARE * tolerance)
+                << tolerance;
+        }
 }
 
 TEST(Plan, TheWorstPlaceCostsNoToleranceAndNoPrecision) {

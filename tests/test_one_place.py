@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """
-All spheres at one place, and that the worst between grid points: what a grid errs by has no mean
+All spheres at one place, which may be the worst between grid points: what a grid errs by has no mean
 there, and must keep the contract of setErrorTolerance() all the same, for few spheres.
 """
 import itertools
