@@ -278,7 +278,10 @@ def testTwoReducedFormsOfOneLattice(platformName):
 
 @pytest.mark.hostOnly  # what decides it is the Plan's alone
 @pytest.mark.withGrid
-@pytest.mark.parametrize("count", [50, 110])
+@pytest.mark.parametrize("count", [
+    pytest.param(12, marks=pytest.mark.xfail(strict=True, reason=(
+        "a steeper window for the worst place, on the same grid of 8 points an edge: 1.37 times, both in the tolerance"))),
+    50, 110])
 def testErrorUnderShearIsThatOfTheOrthogonalBox(platformName, count):
     """
     At fixed xi, grid and support, mean over 20 configurations, half tilt against none; with a Plan for few

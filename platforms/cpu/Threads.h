@@ -46,10 +46,10 @@ public:
     }
 
     /**
-     * Call body(). Until it returns the other threads wait for the tasks of run() without going to
-     * sleep: a run() then takes about a microsecond besides its tasks, not the waking of threads,
-     * which is many times that. For many short runs one after another. The pool must have no other
-     * use meanwhile.
+     * Call body(). Until it returns the other threads wait awake for the tasks of run(), which then
+     * takes about a microsecond besides its tasks, not the waking of threads, which is many times
+     * that; after about a millisecond without a task they doze. For many short runs one after
+     * another. The pool must have no other use meanwhile.
      */
     template <class Body> void keepAwake(Body body) const {
         if (serial || share != nullptr) {
