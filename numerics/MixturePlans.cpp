@@ -20,6 +20,10 @@ namespace {
 constexpr double BUDGET = 0.5, REAL_BUDGET = 0.74;
 /// the same in the unit of PlanFamily::error
 constexpr double DROPPED_SHARE = REAL_BUDGET / BUDGET;
+/// In radii of the largest sphere: where all spheres may be at one place, what the few images and
+/// modes of such a box leave out adds up, and its mean square, by integrals, says little. The share
+/// of the tolerance that estimates may use up, therefore.
+constexpr double NARROW_BOX = 12, NARROW_BOX_SHARE = 0.22;
 /// of the tolerance, for the whole error: what the grid is finer than it need be, a shorter range
 /// may use up
 constexpr double PREDICTED_SHARE = 0.96;
@@ -63,7 +67,11 @@ MixturePlans::MixturePlans(const PlanRequest& request, Places places)
       errors(composition, box, phi,
              std::min(extent,
                       LARGEST_EXTENT * std::cbrt(composition.volume() / composition.particles())),
-             places == Places::Together ? imageSpacing() : 0) {}
+             places == Places::Spread ? 0 : imageSpacing()) {
+    if (places != Places::Spread &&
+        narrowestWidth(request) < NARROW_BOX * request.radius * composition.radii.back())
+        error = std::min(error, NARROW_BOX_SHARE * BUDGET * request.tolerance);
+}
 
 double MixturePlans::unitRadius(const std::vector<double>& radii) {
     double squares = 0;

@@ -223,9 +223,9 @@ Plan planFor(const PlanRequest& request, Places places) {
     return cheaper && (!keeps || other.predictedError <= request.tolerance) ? other : *prolate;
 }
 
-std::optional<Plan> planForWorstPlace(const PlanRequest& request) {
+std::optional<Plan> planIfAny(const PlanRequest& request, Places places) {
     try {
-        return planFor(request, Places::Together);
+        return planFor(request, places);
     } catch (const std::invalid_argument&) {
         return std::nullopt;
     }
@@ -237,17 +237,20 @@ Plan makePlan(const PlanRequest& request) {
     // a sum over modes has no grid that places could matter for
     if (request.numParticles > FEW || request.directSums)
         return planFor(request, Places::Spread);
-    const std::optional<Plan> worst = planForWorstPlace(request);
-    const bool singleDoes = request.tolerance >= request.singleFloor;
-    if (worst && worst->predictedError <= request.tolerance &&
-        (worst->precision == Precision::Single || !singleDoes))
-        return *worst;
-    // Near the ends of single and double precision, and where a prescribed grid or window does not
+    std::optional<Plan> precise; // keeps the tolerance in double precision, where single would do
+    for (Places places : {Places::Together, Places::TogetherSteep}) {
+        const std::optional<Plan> plan = planIfAny(request, places);
+        if (plan && plan->predictedError <= request.tolerance) {
+            if (plan->precision == Precision::Single || request.tolerance < request.singleFloor)
+                return *plan;
+            precise = precise ? precise : plan;
+        }
+        if (isMixture(request.radii)) // its window is the same
+            break;
+    }
+    // Near the ends of what precision there is, and where a prescribed grid or window does not
     // serve the worst place, the mean over places has to do.
-    const Plan mean = planFor(request, Places::Spread);
-    const bool better = mean.predictedError <= request.tolerance &&
-                        (mean.precision == Precision::Single || !singleDoes);
-    return better || !worst ? mean : *worst;
+    return precise && !request.singleOnly ? *precise : planFor(request, Places::Spread);
 }
 
 } // namespace PSE::numerics

@@ -107,8 +107,8 @@ bool isMixture(const std::vector<double>& radii);
  * Choose all parameters so that the predicted error for unit random forces at volume fraction
  * max(phi, 0.3) keeps the tolerance (with Hasimoto's split each half at most tolerance/2), at the
  * lowest cost by the model of PlanCost.h. Up to 100 spheres keep it where all are at one place,
- * too, the worst between grid points, unless that would cost the precision or cannot be had, also
- * with what is prescribed.
+ * too, the worst between grid points, if need be in double precision, unless that cannot be had,
+ * also with what is prescribed.
  * @throws std::invalid_argument naming what cannot be met
  */
 Plan makePlan(const PlanRequest& request);

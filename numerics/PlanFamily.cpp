@@ -31,9 +31,10 @@ constexpr int MORE_SUPPORT = 4; ///< than the rule, at most
 /// sqrt(6): what the self mobility errs by at the worst place between grid points, a sum of one
 /// cosine along each axis, over the root of its mean square
 constexpr double WORST_PLACE = 2.45;
-/// of the window's shape to its support, there: with more, aliases of the main lobe and of the edge
-/// may cancel in the estimate, and do not at every place
-constexpr double LARGEST_RATIO = 2.35;
+/// Of the window's shape to its support, there. Beyond the first number aliases of the main lobe
+/// limit what a window can do, which come nearer as a box tilts. Beyond the second these and the
+/// ones of its edge may cancel in the estimate, and do not at every place.
+constexpr double LARGEST_RATIO = 1.95, STEEPEST_RATIO = 2.35;
 /// the other end of the grids that are tried, see FINEST, and how closely the best is sought
 constexpr double COARSEST = 0.85, GRID_PRECISION = 0.004;
 constexpr double UNAFFORDABLE = 1e50; ///< factor on the cost of a Plan that misses the tolerance
@@ -236,7 +237,9 @@ void PlanFamily::predict(Plan& plan, double wave) const {
 
 double PlanFamily::shapeOf(int support) const {
     const double shape = shapeFor(windowError(), support);
-    return places == Places::Spread ? shape : std::min(shape, LARGEST_RATIO * support);
+    if (places == Places::Spread)
+        return shape;
+    return std::min(shape, support * (places == Places::Together ? LARGEST_RATIO : STEEPEST_RATIO));
 }
 
 std::vector<int> PlanFamily::supports() const {

@@ -36,8 +36,9 @@ void checkPlan(const Plan& plan, const PlanRequest& request);
 bool isPrescribed(const PlanOverrides& wish);
 /** What estimates of errors know of the places of spheres between grid points. */
 enum class Places {
-    Spread,  ///< as many at each: the mean square counts
-    Together ///< all may be at one, which may be the worst
+    Spread,       ///< as many at each: the mean square counts
+    Together,     ///< all may be at one, which may be the worst
+    TogetherSteep ///< the same, with windows that fall faster towards their edge on the same points
 };
 
 /** makePlan() for force coupling [T44]. */

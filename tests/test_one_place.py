@@ -44,6 +44,35 @@ def mobilityOf(family, scene):
     return scenes.mobilityColumns(integrator, scene.count)
 
 
+def failuresAtTheWorstPlace(platformName, family, pair, kind, tolerance):
+    """
+    What errs by more than the tolerance, in words.
+
+    pair  one sphere of each kind
+    kind  (N,) of each sphere
+    """
+    count = len(kind)
+    of = mobilityOf(family, pair).reshape(2, 3, 2, 3)
+    M = of[kind][:, :, kind].reshape(3*count, 3*count)
+    radii = None if pair.radii is None else pair.radii[kind]
+    scene = Scene(np.zeros((count, 3)), pair.box, pair.radius, radii)
+    context, integrator = makeContext(scene, platformName, tolerance=tolerance, configure=configure(family))
+    grid = np.array(integrator.getNumericalParameters()["gridDimensions"])
+    failures = []
+    for corner in CORNERS:
+        context.setPositions(np.tile((1 + corner)/grid @ pair.box, (count, 1)))
+        for forces in (scenes.uniformForces(scene), scenes.randomForces(scene)):
+            exact = (M @ forces.ravel()).reshape(-1, 3)
+            error = errorRatio(integrator.applyMobility(forces), exact, forces, scene)/tolerance
+            if not error <= 1:
+                failures.append(f"{count} at {tolerance:g}, {corner}: {error:.2f} tolerances")
+    return failures
+
+
+def pairOf(ratio, box):
+    return Scene(np.zeros((2, 3)), box, RADIUS, None if ratio == 1 else np.array([ratio, 1])*RADIUS)
+
+
 @pytest.mark.hostOnly
 @pytest.mark.withGrid
 @pytest.mark.parametrize("family", FAMILIES)
@@ -51,23 +80,27 @@ def mobilityOf(family, scene):
 def testAtTheWorstPlaceBetweenGridPoints(platformName, box, family):
     """Uniform and random forces."""
     ratio = FAMILIES[family][2]
-    pair = Scene(np.zeros((2, 3)), BOXES[box], RADIUS, None if ratio == 1 else np.array([ratio, 1])*RADIUS)
-    of = mobilityOf(family, pair).reshape(2, 3, 2, 3)
     failures = []
     for count, tolerance in itertools.product((1, 7), allServed(platformName, TOLERANCES)):
-        if count == 1 and ratio != 1:
-            continue
-        kind = np.arange(count) % 2
-        M = of[kind][:, :, kind].reshape(3*count, 3*count)
-        radii = None if ratio == 1 else np.where(kind == 0, ratio, 1)*RADIUS
-        scene = Scene(np.zeros((count, 3)), BOXES[box], RADIUS, radii)
-        context, integrator = makeContext(scene, platformName, tolerance=tolerance, configure=configure(family))
-        grid = np.array(integrator.getNumericalParameters()["gridDimensions"])
-        for corner in CORNERS:
-            context.setPositions(np.tile((1 + corner)/grid @ BOXES[box], (count, 1)))
-            for forces in (scenes.uniformForces(scene), scenes.randomForces(scene)):
-                exact = (M @ forces.ravel()).reshape(-1, 3)
-                error = errorRatio(integrator.applyMobility(forces), exact, forces, scene)/tolerance
-                if not error <= 1:
-                    failures.append(f"{count} at {tolerance:g}, {corner}: {error:.2f} tolerances")
+        if count > 1 or ratio == 1:
+            failures += failuresAtTheWorstPlace(platformName, family, pairOf(ratio, BOXES[box]),
+                                                np.arange(count) % 2, tolerance)
+    assert not failures, "; ".join(failures)
+
+
+@pytest.mark.hostOnly
+@pytest.mark.withGrid
+@pytest.mark.parametrize("family", ["unequal", "unequal, Hasimoto"])
+@pytest.mark.parametrize("ratio, edge", [(1.3, 2.5), (2, 2.2), (4, 5), (4, 7), (10, 2.2), (10, 2.5)])
+def testUnequalSpheresInANarrowBox(platformName, ratio, edge, family):
+    """
+    Few modes and images, whose errors add up, up to single precision's end.
+
+    edge  of the box, in radii of the larger sphere
+    """
+    failures = []
+    for kind, tolerance in itertools.product(([0, 1], [0, 1, 0], [0, 1, 1, 1]),
+                                             allServed(platformName, (1e-3, 1e-5, 1e-6, 1e-7))):
+        failures += failuresAtTheWorstPlace(
+            platformName, family, pairOf(ratio, scenes.cube(edge*ratio*RADIUS)), np.array(kind), tolerance)
     assert not failures, "; ".join(failures)
