@@ -107,6 +107,14 @@ class Lockstep:
     def tolerance(self):
         return served(self.platformName, self.scene.tolerance)
 
+    @property
+    def hasListsOfOpenMM(self):
+        """
+        OpenMM's lists of neighbours on CPU begin when it sees fit, and go on after a checkpoint: floats are
+        added in another order.
+        """
+        return self.scene.repulsion and self.platformName == "CPU"
+
     def makeParty(self, platformName, plan=None, box=None):
         integrator = self.scene.makeIntegrator(platformName, self.tolerance)
         if plan is not None:
@@ -334,16 +342,24 @@ class Lockstep:
         with refusing():
             subject.integrator.step(steps)
         after = subject.condition()
+        if self.hasListsOfOpenMM:
+            subject.context.loadCheckpoint(data)
+            subject.integrator.step(steps)
+            first, after = after, subject.condition()
+            rounding = 1e-6*(self.scene.radius + abs(first[0]).max())
+            assert np.allclose(first[0], after[0], rtol=0, atol=rounding), "a checkpoint does not repeat the steps"
         for last in (False, True):
             subject.context.loadCheckpoint(data)
             assert same(before[2:], subject.condition()[2:]) and np.array_equal(before[0], subject.positions)
             if not last:
                 subject.integrator.step(steps)
                 assert same(after, subject.condition()), "a checkpoint does not repeat the steps"
-        if not self.shadow.stepped: # whether a box that is set next is another one counts from the first step
+        # whether a box that is set next is another one counts from the first step
+        if not self.shadow.stepped or self.hasListsOfOpenMM:
             data = self.shadow.context.createCheckpoint()
-            self.shadow.integrator.step(steps)
-            self.shadow.context.loadCheckpoint(data)
+            for _ in range(3 if self.hasListsOfOpenMM else 1):
+                self.shadow.integrator.step(steps)
+                self.shadow.context.loadCheckpoint(data)
             self.shadow.stepped = True
         subject.context.setVelocities(before[1])
         self.shadow.context.setVelocities(before[1])
@@ -352,8 +368,7 @@ class Lockstep:
     def callXml(self):
         """System, integrator and State as texts: another Context made from them goes on."""
         self.subject = self.throughXml(self.subject)
-        if self.scene.repulsion and self.platformName == "CPU":
-            # OpenMM begins a list of neighbours there, and floats are added in another order
+        if self.hasListsOfOpenMM:
             self.shadow = self.throughXml(self.shadow)
         else:
             self.shadow.context.getState(**EVERYTHING)
@@ -424,7 +439,7 @@ class Lockstep:
         self.oracle.context.setTime(self.shadow.context.getTime())
         with refusing():
             found = self.subject.integrator.computeStress(7, groups)._value
-        if self.scene.repulsion and self.platformName == "CPU": # lists of neighbours, as in callXml()
+        if self.hasListsOfOpenMM:
             self.shadow.integrator.computeStress(7, groups)
         expected = self.oracle.integrator.computeStress(7, groups)._value
         energy = self.oracle.context.getState(energy=True, groups=groups).getPotentialEnergy()._value

@@ -58,6 +58,9 @@ KEPT_ON_HOSTS = {
     "a box set after a checkpoint of a Context without steps": RandomScene(
         seed=16112, count=33, phi=0.006342, edges=(1.418, 0.8162), places="chain", massless=7, tolerance=1.315e-06,
         size=1.149e-05, repulsion=True, calls=(("stress",), ("checkpoint", 1), ("box", 0.984, 0.128))),
+    "a list of neighbours begun between a checkpoint and its return": RandomScene(
+        seed=36054, boundary="Unbounded", places="chain", size=0.002227, repulsion=True,
+        calls=(("step", 3), ("checkpoint", 2), ("step", 4))),
     "a box set before a copy of what was made for another temperature": RandomScene(
         phi=0.02941, edges=(0.5449, 1.376), kinds=2, ratio=5.627, temperature=0.0, tolerance=0.001752, size=0.7536,
         calls=(("reinitialize", False), ("temperature", 2.0), ("samples", 1), ("box", 0.96, 0.042), ("xml",))),
