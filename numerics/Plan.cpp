@@ -245,8 +245,8 @@ Plan makePlan(const PlanRequest& request) {
                 return *plan;
             precise = precise ? precise : plan;
         }
-        if (isMixture(request.radii)) // its window is the same
-            break;
+        if (isMixture(request.radii) || request.overrides.windowShape > 0)
+            break; // the window is the same
     }
     // Near the ends of what precision there is, and where a prescribed grid or window does not
     // serve the worst place, the mean over places has to do.

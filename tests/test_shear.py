@@ -282,10 +282,14 @@ def plannedForShear(platformName, start, tolerance, fromStill):
 
     fromStill  with what a box at rest takes, prescribed
     """
-    _, planned = makeContext(start, platformName, tolerance=tolerance)
-    parameters = planned.getNumericalParameters()
-    return makeContext(start, platformName, tolerance=tolerance, configure=shear(
-        0.01, more=lambda i: i.setNumericalParameters(parameters) if fromStill else None))
+    prescribe = None
+    if fromStill:
+        _, planned = makeContext(start, platformName, tolerance=tolerance)
+        parameters = planned.getNumericalParameters()
+
+        def prescribe(i):
+            i.setNumericalParameters(parameters)
+    return makeContext(start, platformName, tolerance=tolerance, configure=shear(0.01, more=prescribe))
 
 
 DEFAULT = None  # tolerance
