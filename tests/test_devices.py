@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What can only go wrong on a device: sorting, rows that grow, positions and refusals that the host does not see."""
+import re
+from pathlib import Path
+
 import numpy as np
 import openmm
 import pytest
@@ -13,6 +16,17 @@ pytestmark = [pytest.mark.deviceOnly, pytest.mark.onePrecision]
 L, RADIUS = 40.0, 0.5
 ROUNDING = 2e-6  # of both platforms in single precision, at positions rounded to floats
 LOOSE = 1e-2     # tolerance: cheap grids
+KERNELS = Path(__file__).resolve().parents[1] / "platforms" / "common" / "kernels"
+WRITTEN_COMPONENT = re.compile(r"\]\s*\.\s*([xyzw]+|s[0-9a-f]+)\s*([-+*/&|^]|<<|>>)?=(?!=)")
+
+
+def testKernelsWriteVectorsInArraysAsAWhole():
+    """Compilers of OpenCL write one component as all four: lost where another thread writes another one."""
+    assert all(map(WRITTEN_COMPONENT.search, ("starts[place].x = 1;", "u[i+1] .y+=f;", "sums[k].s03 = 0;")))
+    assert not any(map(WRITTEN_COMPONENT.search, ("x = u[i].x;", "u[i].x == 0", "u[i].x >= 0", "next.x = s*v[i].x;")))
+    texts = {path.name: path.read_text() for path in KERNELS.glob("*.cc")}
+    assert texts
+    assert [name for name, text in texts.items() if WRITTEN_COMPONENT.search(text)] == []
 
 
 def clustered(N, few):

@@ -8,11 +8,12 @@
 /**
  * Where the windows of particles begin and what they weigh, one thread for each weight.
  * @param coefficients  [WINDOW_DEGREE+1][SUPPORT], highest power first, in t of Window::polynomials
- * @param starts        first grid point along each axis, in [0, size)
+ * @param starts        [n][4] first grid point along each axis, in [0, size); numbers, not vectors: compilers of
+ * OpenCL write one component of a vector as all four, and other threads write the others
  * @param weights       [n][3][SUPPORT]
  */
 KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, GLOBAL const fraction4* RESTRICT places,
-        GLOBAL const real* RESTRICT coefficients, GLOBAL int4* RESTRICT starts, GLOBAL real* RESTRICT weights) {
+        GLOBAL const real* RESTRICT coefficients, GLOBAL int* RESTRICT starts, GLOBAL real* RESTRICT weights) {
     for (int i = GLOBAL_ID; i < n*POINTS; i += GLOBAL_SIZE) {
         const int place = i/POINTS, axis = i%POINTS/SUPPORT, point = i%SUPPORT;
         const fraction4 s = places[place];
@@ -30,14 +31,8 @@ KERNEL void evaluateWindows(int n, int4 size, GLOBAL const int* RESTRICT plan, G
         for (int power = 1; power <= WINDOW_DEGREE; power++)
             weight = weight*t+coefficients[power*SUPPORT+point];
         weights[i] = weight;
-        if (point == 0) {
-            if (axis == 0)
-                starts[place].x = start;
-            else if (axis == 1)
-                starts[place].y = start;
-            else
-                starts[place].z = start;
-        }
+        if (point == 0)
+            starts[4*place+axis] = start;
     }
 }
 
