@@ -3,7 +3,7 @@
 
 Of all programs that the tests needed on OpenCL, with the defines that a GPU gets for the same scene,
 those are compiled that it takes to see every define, and one of each kind for every architecture
-(nvrtc.py); a few scenes are run here in any case.
+(nvrtc.py); those of devicescenes.py are run here in any case.
 """
 
 import os
@@ -11,12 +11,10 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+import devicescenes
 import nvrtc
-import scenes
-from openmmpse import PSEBrownianIntegrator
 from platformnames import absence
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,57 +72,6 @@ def compiled(jobs):
         pytest.skip(str(missing))
 
 
-def recordScenes():
-    """Run small scenes on OpenCL that between them use every kernel."""
-    suspensions = [
-        scenes.randomSuspension(20, 0.1, scenes.cube(1), 0.5, 3),
-        scenes.randomSuspension(20, 0.1, scenes.tilted(1), 0.5, 3),
-    ]
-    splits = (PSEBrownianIntegrator.Prolate, PSEBrownianIntegrator.Hasimoto)
-    runs = [(scene, split, 1e-3) for scene, split in zip(suspensions, splits)]
-    for precision in nvrtc.PRECISIONS:
-        loosest = (suspensions[0], PSEBrownianIntegrator.AutomaticSplit, 1e-1)
-        tightest = (*loosest[:2], 1e-6 if precision == "double" else 1e-4)
-        for scene, split, tolerance in [*runs, loosest, tightest]:
-            runOnOpenCL(scene, precision, tolerance, lambda it: it.setSplit(split))
-        for scene, tolerance in unequalSpheres():
-            runOnOpenCL(scene, precision, tolerance, lambda it: None)
-            unbounded = PSEBrownianIntegrator.Unbounded
-            runOnOpenCL(scene, precision, tolerance, lambda it: it.setFluidBoundary(unbounded))
-        runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setFluidBoundary(unbounded))
-        gaussian = PSEBrownianIntegrator.ForceCoupling
-        runOnOpenCL(suspensions[0], precision, 1e-3, unboundedGaussian)
-        runOnOpenCL(suspensions[0], precision, 1e-2, lambda it: it.setMobilityModel(gaussian))
-        freely = PSEBrownianIntegrator.FreeDraining
-        runOnOpenCL(suspensions[0], precision, 1e-3, lambda it: it.setMobilityModel(freely))
-
-
-def unboundedGaussian(integrator):
-    integrator.setFluidBoundary(PSEBrownianIntegrator.Unbounded)
-    integrator.setMobilityModel(PSEBrownianIntegrator.ForceCoupling)
-
-
-def unequalSpheres():
-    """Classes and interpolated radii; one box needs images, one is tilted."""
-    few, many = np.where(np.arange(20) % 5 == 0, 1.0, 0.4), np.linspace(0.4, 0.9, 20)
-    small = scenes.mixture(few, 0.1, scenes.cube(1), 4)
-    return [
-        (small, 1e-3),
-        (scenes.mixture(many, 0.1, scenes.tilted(1), 5), 1e-2),
-        (scenes.Scene(small.positions[:5], scenes.cube(3.0), 0.4, few[:5]), 1e-3),
-    ]
-
-
-def runOnOpenCL(scene, precision, tolerance, configure):
-    """Let the library do all it can at a scene."""
-    context, integrator = scenes.makeContext(
-        scene, f"OpenCL-{precision}", 300, tolerance=tolerance, configure=configure
-    )
-    integrator.step(2)
-    integrator.sampleBrownianDisplacements(1)
-    assert np.all(np.isfinite(integrator.applyMobility(scenes.randomForces(scene))))
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """Every program that was compiled on OpenCL so far."""
@@ -135,7 +82,9 @@ def recorded(tmp_path_factory):
         folder = str(tmp_path_factory.mktemp("kernels"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("OPENMMPSE_KERNEL_DUMP", folder)
-        recordScenes()
+        for precision in nvrtc.PRECISIONS:
+            for scene in devicescenes.allFor(precision):
+                devicescenes.runOnOpenCL(precision, *scene)
     return nvrtc.readPrograms(folder)
 
 
