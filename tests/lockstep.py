@@ -115,6 +115,15 @@ class Lockstep:
         """
         return self.scene.repulsion and self.platformName == "CPU"
 
+    @property
+    def keepsImagesInFloats(self):
+        """
+        Where a Force has a cutoff, OpenMM's devices wrap positions into the box when they are set, in floats: a State
+        with positions outside of it comes back to rounding.
+        """
+        inFloats = isDevice(self.platformName) and not self.platformName.endswith("double")
+        return inFloats and self.scene.repulsion and self.scene.wrapped
+
     def makeParty(self, platformName, plan=None, box=None):
         integrator = self.scene.makeIntegrator(platformName, self.tolerance)
         if plan is not None:
@@ -367,11 +376,15 @@ class Lockstep:
 
     def callXml(self):
         """System, integrator and State as texts: another Context made from them goes on."""
+        before = self.subject.positions
         self.subject = self.throughXml(self.subject)
-        if self.hasListsOfOpenMM:
+        if self.hasListsOfOpenMM or self.keepsImagesInFloats:
             self.shadow = self.throughXml(self.shadow)
         else:
             self.shadow.context.getState(**EVERYTHING)
+        if self.keepsImagesInFloats:
+            rounding = 4*SINGLE*(abs(before).max() + abs(self.shadow.box).max())
+            assert abs(self.subject.positions - before).max() <= rounding, "other positions after xml"
         self.meetBox()
 
     def throughXml(self, party):

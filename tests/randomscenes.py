@@ -293,10 +293,10 @@ def possible(scene):
         scene = dataclasses.replace(scene, kinds=1, ratio=1.0)
     if scene.split not in SPLITS[scene.model]:
         scene = dataclasses.replace(scene, split="AutomaticSplit")
-    if scene.places == "one place": # a pair force has no direction there
-        scene = dataclasses.replace(scene, repulsion=False)
     if scene.boundary == "Unbounded" or not scene.wrapped:
         scene = dataclasses.replace(scene, images=0)
+    if scene.places == "one place": # a pair force has no direction there, a bond that of rounding if images differ
+        scene = dataclasses.replace(scene, repulsion=False, bonds=scene.bonds and scene.images == 0)
     return scene
 
 

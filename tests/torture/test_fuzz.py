@@ -41,6 +41,9 @@ KEPT = {
         seed=14445, count=35, split="Hasimoto", phi=0.05225, edges=(2.072, 3.514), tilts=(0.0, 0.31, -1.0), kinds=5,
         ratio=5.423, massless=15, radius=2.802, viscosity=1.161, tolerance=4.237e-05, bonds=True, repulsion=True,
         wrapped=False, strain=-0.336, protocol="StartUpShear", calls=(("samples", 2),)),
+    "a State of positions in other images of the box": RandomScene(
+        seed=59483, count=34, images=3, kinds=3, ratio=5.48, radius=0.1927, viscosity=573000.0, temperature=0.0,
+        tolerance=4.188e-06, size=4.467e-06, bonds=True, repulsion=True, strain=0.266, calls=(("xml",),)),
     "seven Gaussian envelopes at the worst place between grid points": RandomScene(
         seed=60573, count=7, model="ForceCoupling", split="AllWaves", phi=0.01087, places="one place",
         tolerance=0.0001964, strain=0.385),
