@@ -116,13 +116,12 @@ class Lockstep:
         return self.scene.repulsion and self.platformName == "CPU"
 
     @property
-    def keepsImagesInFloats(self):
+    def keepsImages(self):
         """
-        Where a Force has a cutoff, OpenMM's devices wrap positions into the box when they are set, in floats: a State
-        with positions outside of it comes back to rounding.
+        Where a Force has a cutoff, OpenMM's devices wrap positions into the box when they are set: a State with
+        positions outside of it comes back to rounding, that of floats in mixed precision, too.
         """
-        inFloats = isDevice(self.platformName) and not self.platformName.endswith("double")
-        return inFloats and self.scene.repulsion and self.scene.wrapped
+        return isDevice(self.platformName) and self.scene.repulsion and self.scene.wrapped
 
     def makeParty(self, platformName, plan=None, box=None):
         integrator = self.scene.makeIntegrator(platformName, self.tolerance)
@@ -378,12 +377,13 @@ class Lockstep:
         """System, integrator and State as texts: another Context made from them goes on."""
         before = self.subject.positions
         self.subject = self.throughXml(self.subject)
-        if self.hasListsOfOpenMM or self.keepsImagesInFloats:
+        if self.hasListsOfOpenMM or self.keepsImages:
             self.shadow = self.throughXml(self.shadow)
         else:
             self.shadow.context.getState(**EVERYTHING)
-        if self.keepsImagesInFloats:
-            rounding = 4*SINGLE*(abs(before).max() + abs(self.shadow.box).max())
+        if self.keepsImages:
+            unit = DOUBLE if self.platformName.endswith("double") else SINGLE
+            rounding = 4*unit*(abs(before).max() + abs(self.shadow.box).max())
             assert abs(self.subject.positions - before).max() <= rounding, "other positions after xml"
         self.meetBox()
 

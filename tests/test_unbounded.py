@@ -324,6 +324,20 @@ def pulls(spheres):
     return scenes.constantForces(kindsOfForces(spheres)[0])
 
 
+def testPeriodicForcesLeaveTheFluidUnbounded(platformName):
+    """OpenMM's devices keep images within the box of a Force with a cutoff; the fluid has none."""
+    rng = np.random.default_rng(8)
+    spheres = Spheres(6*rng.random((20, 3)) + [-3, 7, 27], 0.5)
+    force = scenes.periodicDummyForce(20, scenes.cube(10.0))
+    made, integrator = context(spheres, platformName, forces=[force], box=scenes.cube(10.0))
+    pull = rng.normal(size=(20, 3))
+    for _ in range(2):
+        exact = (Spheres.mobility(spheres) @ pull.ravel()).reshape(-1, 3)
+        assert np.linalg.norm(integrator.applyMobility(pull) - exact) < 1e-5*np.linalg.norm(exact)
+        integrator.step(1)
+        spheres.positions = positionsOf(made)
+
+
 @models
 def testAStepIsMobilityTimesForceAndNoise(platformName, model):
     """At kT = 0 M f dt; with noise the same and what the noise alone does from the same place."""

@@ -53,12 +53,13 @@ inline void uploadMixed(OpenMM::ComputeArray& array, OpenMM::ComputeContext& con
         array.initialize(context, values.size(), mixedSize(context), name);
     array.upload(values, true);
 }
-/** An array of vectors of four reals. */
+/** An array of vectors of four numbers. */
 inline void uploadVectors(OpenMM::ComputeArray& array, OpenMM::ComputeContext& context,
-                          const std::vector<double>& values, const char* name) {
+                          const std::vector<double>& values, const char* name, bool areDoubles) {
     if (!array.isInitialized())
-        array.initialize(context, values.size() / 4, 4 * realSize(context), name);
-    if (realIsDouble(context))
+        array.initialize(context, values.size() / 4,
+                         4 * (areDoubles ? sizeof(double) : sizeof(float)), name);
+    if (areDoubles)
         array.upload(values.data());
     else
         array.upload(std::vector<float>(values.begin(), values.end()).data());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "DeviceFlow.h"
-#include <cstring>
 
 using namespace OpenMM;
 using PSE::numerics::Lattice;
@@ -8,33 +7,22 @@ using PSE::numerics::Matrix3;
 
 namespace PSE {
 
-DeviceFlow::DeviceFlow(DevicePrograms& programs) : context(programs.context()) {
+DeviceFlow::DeviceFlow(DevicePrograms& programs)
+    : context(programs.context()), images(programs.context()) {
     carryAlong = DeviceKernel(context, programs.particles(), "carryAlong");
 }
 
-/** Whoever wraps or unwraps particles does not tell: all are compared. */
-void DeviceFlow::followImages(const Lattice& box) {
-    const std::vector<mm_int4>& images = context.getPosCellOffsets();
-    if (images.size() == imagesSeen.size() &&
-        std::memcmp(images.data(), imagesSeen.data(), images.size() * sizeof(mm_int4)) == 0)
-        return;
-    const Matrix3& v = box.vectors();
-    std::vector<double> heights;
-    heights.reserve(images.size());
-    for (const mm_int4& image : images)
-        heights.push_back(v(1, 1) * image.y + v(1, 2) * image.z);
-    uploadMixed(lifts, context, heights, "pseLifts");
-    imagesSeen = images;
-}
-
 void DeviceFlow::carry(double strain, double dt, const Lattice& box) {
-    followImages(box);
+    Matrix3 heights = box.vectors(); // alone: the rest tilts in every step
+    heights.row(0).setZero();
+    images.follow(heights);
     const int n = context.getNumAtoms();
     if (context.getUseMixedPrecision())
-        carryAlong(n, n, Mixed{strain}, Mixed{dt}, lifts, context.getPosq(), context.getVelm(),
-                   context.getPosqCorrection());
+        carryAlong(n, n, Mixed{strain}, Mixed{dt}, images.shifts(), context.getPosq(),
+                   context.getVelm(), context.getPosqCorrection());
     else
-        carryAlong(n, n, Mixed{strain}, Mixed{dt}, lifts, context.getPosq(), context.getVelm());
+        carryAlong(n, n, Mixed{strain}, Mixed{dt}, images.shifts(), context.getPosq(),
+                   context.getVelm());
 }
 
 void DeviceFlow::tilt(double strain, const Lattice& box) {

@@ -2,17 +2,14 @@
 #ifndef OPENMMPSE_DEVICEFLOW_H_
 #define OPENMMPSE_DEVICEFLOW_H_
 
-#include "DeviceArrays.h"
+#include "DeviceImages.h"
 #include "DevicePrograms.h"
-#include "numerics/Lattice.h"
-#include <vector>
 
 namespace PSE {
 
 /**
  * Undisturbed shear flow on a device [T35]: particles that it carries, and the box that tilts with
- * it. OpenMM keeps one image of each particle there, and by how many box vectors it is away from
- * the particle itself: these images lie in a tilting box, too.
+ * it. The images that OpenMM keeps of particles lie in a tilting box, too.
  */
 class DeviceFlow {
 public:
@@ -28,11 +25,8 @@ public:
     void tilt(double strain, const numerics::Lattice& box);
 
 private:
-    void followImages(const numerics::Lattice& box);
-
     OpenMM::ComputeContext& context;
-    std::vector<OpenMM::mm_int4> imagesSeen; ///< box vectors from each particle to its image
-    OpenMM::ComputeArray lifts;
+    DeviceImages images;
     DeviceKernel carryAlong;
 };
 

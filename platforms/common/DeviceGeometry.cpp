@@ -47,7 +47,7 @@ int uploadImages(GrowingArray& array, ComputeContext& context, const Lattice& bo
     const size_t count = vectors.size() / 4;
     array.reserve(context, count, 4 * realSize(context), "pseImages");
     vectors.resize(4 * array.size(), 0.0);
-    uploadVectors(*array, context, vectors, "pseImages");
+    uploadVectors(*array, context, vectors, "pseImages", realIsDouble(context));
     return static_cast<int>(count);
 }
 

@@ -68,7 +68,7 @@ int DeviceSphereSpread::makeShapes(const Plan& plan) {
         std::copy(own.rbegin(), own.rend(),
                   powers.begin() + size_t(i + 1) * (degree + 1) - own.size());
     }
-    uploadVectors(shapes, context, all, "pseShapes");
+    uploadVectors(shapes, context, all, "pseShapes", realIsDouble(context));
     uploadReals(coefficients, context, powers, "pseShells");
     return degree;
 }

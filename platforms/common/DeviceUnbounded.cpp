@@ -56,7 +56,8 @@ DeviceUnbounded::DeviceUnbounded(DevicePrograms& programs, int particles,
                    DeviceLanczos::summaryRows(LanczosTridiagonal::WHOLE), clock),
       drag(6 * M_PI * viscosity * plan.a), perRadius(1 / plan.a),
       lanczos(programs.context(), places, summary, plan.lanczosTolerance, plan.negativeTolerance,
-              LanczosTridiagonal::WHOLE) {
+              LanczosTridiagonal::WHOLE),
+      images(programs.context()) {
     std::vector<double> values(particles, 1.0);
     for (size_t i = 0; i < mobile.size(); i++)
         values[mobile[i]] = radii[i] / plan.a;
@@ -85,12 +86,18 @@ void DeviceUnbounded::withMatrix(DeviceKernel& kernel, Arguments&&... arguments)
 
 void DeviceUnbounded::setPositions() {
     places.update();
+    OpenMM::Vec3 a, b, c;
+    context.getPeriodicBoxVectors(a, b, c);
+    Matrix3 box;
+    box << a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2];
+    images.follow(box);
     const int n = places.count();
     if (context.getUseMixedPrecision())
-        locateCentres(n, n, context.getPosq(), places.slots(), places.places(), radius, centres,
-                      context.getPosqCorrection(), rests);
+        locateCentres(n, n, context.getPosq(), places.slots(), places.places(), radius,
+                      images.shifts(), centres, context.getPosqCorrection(), rests);
     else
-        locateCentres(n, n, context.getPosq(), places.slots(), places.places(), radius, centres);
+        locateCentres(n, n, context.getPosq(), places.slots(), places.places(), radius,
+                      images.shifts(), centres);
 }
 
 void DeviceUnbounded::computeVelocities(bool forced, const Thermal* thermal) {

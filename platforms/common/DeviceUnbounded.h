@@ -3,6 +3,7 @@
 #define OPENMMPSE_DEVICEUNBOUNDED_H_
 
 #include "DeviceEngine.h"
+#include "DeviceImages.h"
 #include "numerics/UnboundedPlan.h"
 
 namespace PSE {
@@ -26,6 +27,7 @@ private:
 
     double drag, perRadius; ///< 6 pi eta a, 1/a
     DeviceLanczos lanczos;
+    DeviceImages images;
     OpenMM::ComputeArray radius, centres, rests;
     DeviceKernel locateCentres, multiplyAll;
 };

@@ -252,9 +252,9 @@ KERNEL void moveParticles(int n, mixed dt, mixed unit, GLOBAL const int* RESTRIC
  * After a step of dt: undisturbed flow carries particles by strain y, y that of the beginning of the
  * step [T35]. What does not move stays where the Context says it is, although its image tilts with
  * the box.
- * @param lifts  by slot, how far above the particle the image is that OpenMM keeps (nm)
+ * @param shifts  by slot, from the particle to the image that OpenMM keeps (nm)
  */
-KERNEL void carryAlong(int numAtoms, mixed strain, mixed dt, GLOBAL const mixed* RESTRICT lifts,
+KERNEL void carryAlong(int numAtoms, mixed strain, mixed dt, GLOBAL const mixed4* RESTRICT shifts,
         GLOBAL real4* RESTRICT posq, GLOBAL mixed4* RESTRICT velm
 #ifdef USE_MIXED_PRECISION
         , GLOBAL real4* RESTRICT posqCorrection
@@ -269,7 +269,7 @@ KERNEL void carryAlong(int numAtoms, mixed strain, mixed dt, GLOBAL const mixed*
         y += rest.y;
 #endif
         mixed4 velocity = velm[slot];
-        mixed height = lifts[slot];
+        mixed height = shifts[slot].y;
         if (velocity.w != 0) { // it has a mass
             const mixed before = y-dt*velocity.y;
             velocity.x += strain/dt*(before-height);

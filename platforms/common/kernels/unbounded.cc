@@ -5,14 +5,15 @@
 // the same one at the same time, and no sum is shared between them.
 
 /**
- * Positions by place, in nm as the Context has them: of two floats in mixed precision, whose
- * differences err by rounding of themselves alone.
+ * Positions by place, in nm as the Context has them, not the images that OpenMM keeps: of two floats in mixed precision,
+ * whose differences err by rounding of themselves alone.
  * @param centres  radius over a in the fourth component
  * @param radius   over a, by particle
+ * @param shifts   by slot, from the particle to its image
  */
 KERNEL void locateCentres(int n, GLOBAL const real4* RESTRICT posq, GLOBAL const int* RESTRICT slotAt,
         GLOBAL const fraction4* RESTRICT places, GLOBAL const real* RESTRICT radius,
-        GLOBAL real4* RESTRICT centres
+        GLOBAL const mixed4* RESTRICT shifts, GLOBAL real4* RESTRICT centres
 #ifdef USE_MIXED_PRECISION
         , GLOBAL const real4* RESTRICT posqCorrection, GLOBAL real4* RESTRICT rests
 #endif
@@ -20,9 +21,21 @@ KERNEL void locateCentres(int n, GLOBAL const real4* RESTRICT posq, GLOBAL const
     for (int place = GLOBAL_ID; place < n; place += GLOBAL_SIZE) {
         const int slot = slotAt[place];
         const real4 p = posq[slot];
-        centres[place] = make_real4(p.x, p.y, p.z, radius[(unsigned int) places[place].w]);
+        const mixed4 shift = shifts[slot];
+        mixed x = p.x, y = p.y, z = p.z;
 #ifdef USE_MIXED_PRECISION
-        rests[place] = posqCorrection[slot];
+        const real4 rest = posqCorrection[slot];
+        x += rest.x;
+        y += rest.y;
+        z += rest.z;
+#endif
+        x -= shift.x;
+        y -= shift.y;
+        z -= shift.z;
+        const real4 centre = make_real4((real) x, (real) y, (real) z, radius[(unsigned int) places[place].w]);
+        centres[place] = centre;
+#ifdef USE_MIXED_PRECISION
+        rests[place] = make_real4((real) (x-centre.x), (real) (y-centre.y), (real) (z-centre.z), 0);
 #endif
     }
 }
